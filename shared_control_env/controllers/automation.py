@@ -1,0 +1,57 @@
+"""The automation: nonlinear predictive control with a warm start."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+import numpy as np
+
+from shared_control_env.controllers.solution import Solution
+from shared_control_env.core import automation_mpc, single
+from shared_control_env.core.condensing import WORKSPACE
+from shared_control_env.core.records import AUTOMATION_MEMORY
+
+
+class Automation:
+    """Desired commands u_a,des by the nonlinear predictive controller of Eq. 12-13.
+
+    Args:
+        parameters: :func:`records.pack` of :class:`Parameters`.
+
+    Attributes:
+        failures: steps since the reset at which the solver failed and the last command was held.
+    """
+
+    def __init__(self, parameters: np.ndarray) -> None:
+        self._parameters = parameters
+        self._memory = np.zeros((), AUTOMATION_MEMORY)
+        self._work = np.zeros((), WORKSPACE)
+
+    @property
+    def failures(self) -> int:
+        return int(self._memory["failures"])
+
+    def reset(self) -> None:
+        """Forget the last commands."""
+        single.clear_automation(self._memory)
+
+    def act(self, scene: np.ndarray) -> Solution:
+        """Decide on one scene.
+
+        Args:
+            scene: record of :data:`records.SCENE`, an array of no dimension; its safe area found.
+
+        Returns:
+            The solution; ``status`` is one of :mod:`automation_mpc`'s, ``dual_residual`` the projected gradient.
+        """
+        begin = perf_counter()
+        status, iterations, residual = single.automate(scene, self._parameters, self._memory, self._work)
+        return Solution(
+            command=self._memory["u_a_des"].copy(),
+            found=status != automation_mpc.FAILED,
+            status=status,
+            iterations=iterations,
+            primal_residual=0.0,
+            dual_residual=residual,
+            time=perf_counter() - begin,
+        )

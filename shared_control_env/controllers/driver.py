@@ -1,0 +1,145 @@
+"""Drivers: the interface that any driver has, and the predictive driver of the paper."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import osqp
+from scipy import sparse
+
+from shared_control_env.controllers.solution import Solution
+from shared_control_env.core import single
+from shared_control_env.core.condensing import WORKSPACE
+from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import pack
+
+
+@runtime_checkable
+class Driver(Protocol):
+    """Anything that drives: scripted, learned, predictive, or a person at the controls.
+
+    A driver that solves a problem may also have an attribute ``solution``, the last
+    :class:`~shared_control_env.controllers.solution.Solution`; it is then reported in ``info``.
+    """
+
+    def reset(self, seed: int | None = None) -> None:
+        """Begin an episode.
+
+        Args:
+            seed: for drivers that draw random numbers.
+        """
+        ...
+
+    def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
+        """Decide on the desired command of one step.
+
+        Args:
+            observation: what a driver perceives, as :data:`core.observation.FEATURES`, shape (25,).
+            scene: the same step in SI units, a record of :data:`core.records.SCENE`, such as ``scene["z"]``.
+
+        Returns:
+            ``u_h,des = [a, delta]`` [m/s^2, rad], shape (2,); clipped to the limits by the caller.
+        """
+        ...
+
+
+class PredictiveDriver:
+    """The driver of Eq. 14-15: the automation's costs without the potential field, linearised, in OSQP.
+
+    The workspace is set up at every reset, so that episodes do not depend on those before, and updated in
+    place at every step. Where OSQP does not solve to tolerance the last feasible command is held.
+
+    Args:
+        parameters: the environment's parameters; defaults to the paper's.
+        eps: OSQP's absolute and relative tolerance.
+
+    Attributes:
+        solution: the last solution; ``status`` is OSQP's code, 1 for solved.
+        failures: steps since the reset at which the last command was held.
+    """
+
+    def __init__(self, parameters: Parameters | None = None, eps: float = 1e-5) -> None:
+        self._parameters = pack(Parameters() if parameters is None else parameters)
+        self._eps = eps
+        n = 2 * int(self._parameters["driver"]["H_c"]) + 1
+        rows = 2 * int(self._parameters["driver"]["H_p"])
+        self.P, self.q = np.zeros((n, n)), np.zeros(n)
+        self.A = np.zeros((rows + n, n))
+        self.low, self.high = np.zeros(rows + n), np.zeros(rows + n)
+        self._work = np.zeros((), WORKSPACE)
+        limits = self._parameters["limits"]
+        self._bounds = np.array([limits["a_max"], limits["delta_max"]])
+        # Entries that may differ from zero, in the order of compressed columns.
+        self._P_columns, self._P_rows = np.nonzero(np.tri(n))
+        pattern = np.vstack([np.ones((rows, n)), np.eye(n)])
+        self._A_columns, self._A_rows = np.nonzero(pattern.T)
+        self._P_pattern, self._A_pattern = sparse.csc_matrix(np.tri(n).T), sparse.csc_matrix(pattern)
+        self.reset()
+
+    def reset(self, seed: int | None = None) -> None:
+        """Begin an episode; the predictive driver draws nothing, so the seed is not used."""
+        self.failures = 0
+        self.solution: Solution | None = None
+        self._last = np.zeros(2)
+        self._solver: osqp.OSQP | None = None
+
+    def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
+        """Desired command u_h,des; see :class:`Driver`."""
+        self.solution = self.solve(scene)
+        return self.solution.command
+
+    def solve(self, scene: np.ndarray) -> Solution:
+        """Condense and solve the program of one scene.
+
+        Args:
+            scene: record of :data:`records.SCENE`, its safe area found.
+
+        Returns:
+            The solution.
+        """
+        begin = perf_counter()
+        single.build_program(
+            scene, self._last, self._parameters, self._work, self.P, self.q, self.A, self.low, self.high
+        )
+        P, A = self.P[self._P_rows, self._P_columns], self.A[self._A_rows, self._A_columns]
+        if self._solver is None:
+            self._solver = self._set_up(P, A)
+        else:
+            self._solver.update(q=self.q, l=self.low, u=self.high, Px=P, Ax=A)
+        result = self._solver.solve(raise_error=False)
+        info = result.info
+        found = info.status_val == osqp.SolverStatus.OSQP_SOLVED
+        if found:
+            self._last = np.clip(result.x[:2], -1.0, 1.0) * self._bounds
+        else:
+            self.failures += 1
+        return Solution(
+            command=self._last.copy(),
+            found=found,
+            status=int(info.status_val),
+            iterations=int(info.iter),
+            primal_residual=float(info.prim_res),
+            dual_residual=float(info.dual_res),
+            time=perf_counter() - begin,
+        )
+
+    def _set_up(self, P: np.ndarray, A: np.ndarray) -> osqp.OSQP:
+        """OSQP workspace with the full pattern; rho adapts by iterations, not by time, so that runs repeat."""
+        self._P_pattern.data, self._A_pattern.data = P, A
+        solver = osqp.OSQP()
+        solver.setup(
+            P=self._P_pattern,
+            q=self.q,
+            A=self._A_pattern,
+            l=self.low,
+            u=self.high,
+            eps_abs=self._eps,
+            eps_rel=self._eps,
+            max_iter=4000,
+            adaptive_rho_interval=50,
+            check_termination=10,
+            verbose=False,
+        )
+        return solver

@@ -1,0 +1,1 @@
+"""The model as array functions compiled by numba; needs neither gymnasium nor highway-env."""

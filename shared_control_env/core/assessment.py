@@ -1,0 +1,90 @@
+"""Risk assessment of the degraded automation (Section III): prediction, lateral and longitudinal risk."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared_control_env.core.dynamics import V_X, R, implicit_step
+from shared_control_env.core.jit import jit
+from shared_control_env.core.lateral_risk import lateral_risk
+from shared_control_env.core.longitudinal_risk import longitudinal_risk
+from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.prediction import ctra
+from shared_control_env.core.records import (
+    ACCELERATION,
+    HEADING,
+    NEAR_ROW,
+    PRESENT,
+    SPEED,
+    YAW_RATE,
+    X,
+    Y,
+)
+from shared_control_env.core.road import locate
+
+
+@jit
+def predict_ego(scene: np.ndarray, u_f: np.ndarray, line: np.ndarray, p: Parameters, signals: np.ndarray) -> None:
+    """Prediction xi(k + tau_p) of the ego under the degraded command (Eq. 1).
+
+    The yaw rate is that of the dynamic model after one step under u_a,f; pose and speed are the present
+    ones. "In the road frame" has two readings on a curve: the tangent frame at the ego, or the curvilinear
+    one. The tangent drifts off by x^2 / 2R (0.3 m in Case 2), which would itself count as risk; so
+    the prediction runs in the Cartesian frame and its end is located on the road.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+        u_f: degraded command, shape (2,).
+        line: reference line.
+        p: parameters.
+        signals: record of :data:`records.SIGNALS`; ``prediction`` and ``prediction_road`` are written.
+    """
+    state = scene.state
+    after = np.empty(6)
+    implicit_step(state, u_f[0], u_f[1], 0.0, p.task.dt, p.vehicle, after)
+    xi = signals.prediction
+    ctra(state[0], state[1], state[2], state[V_X], u_f[0], after[R], p.task.tau_p, xi)
+    s, d, _, _ = locate(line, xi[0], xi[1])
+    signals.prediction_road[0], signals.prediction_road[1] = s, d
+
+
+@jit
+def predict_neighbours(
+    scene: np.ndarray, traffic: np.ndarray, line: np.ndarray, tau: float, predicted: np.ndarray
+) -> None:
+    """Prediction of the three neighbours by Eq. 1 under their present acceleration and yaw rate.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+        traffic: other vehicles, shape (n, 8).
+        line: reference line.
+        tau: horizon [s].
+        predicted: rows ``[present, s, v]``, written, shape (3, 3).
+    """
+    xi = np.empty(6)
+    for i in range(3):
+        predicted[i, 0] = scene.neighbours[i, PRESENT]
+        if scene.neighbours[i, PRESENT] > 0.0:
+            o = traffic[int(scene.neighbours[i, NEAR_ROW])]
+            ctra(o[X], o[Y], o[HEADING], o[SPEED], o[ACCELERATION], o[YAW_RATE], tau, xi)
+            predicted[i, 1] = locate(line, xi[0], xi[1])[0]
+            predicted[i, 2] = xi[3]
+
+
+@jit
+def assess(scene: np.ndarray, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: np.ndarray) -> None:
+    """Both risks of letting ``signals.u_a_f`` drive the car (Eq. 1-8).
+
+    Args:
+        scene: record of :data:`records.SCENE`, its safe area found.
+        traffic: other vehicles, shape (n, 8).
+        line: reference line.
+        p: parameters.
+        signals: ``prediction``, ``prediction_road``, ``r_x`` and ``r_y`` are written.
+    """
+    predict_ego(scene, signals.u_a_f, line, p, signals)
+    predicted = np.empty((3, 3))
+    predict_neighbours(scene, traffic, line, p.task.tau_p, predicted)
+    s, d = signals.prediction_road[0], signals.prediction_road[1]
+    signals.r_y = lateral_risk(scene.area, s, d, p.lateral)
+    signals.r_x = longitudinal_risk(s, signals.prediction[3], predicted, p.vehicle.length, p.longitudinal)

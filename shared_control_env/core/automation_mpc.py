@@ -1,0 +1,194 @@
+"""The automation: nonlinear model predictive control (Eq. 12, 13) by Gauss-Newton SQP.
+
+The cost is a sum of squares, so each iteration linearises the residuals along the rollout of the
+implicit model, solves the box-bounded quadratic program for a step and searches along it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared_control_env.core.box_qp import solve_box_qp
+from shared_control_env.core.condensing import add_effort, add_square, add_tracking, clear, propagate
+from shared_control_env.core.dynamics import V_X, R, S, Y, implicit_step, implicit_step_jacobian
+from shared_control_env.core.jit import jit
+from shared_control_env.core.lateral_risk import continuous_field
+from shared_control_env.core.parameters import Limits, Parameters
+from shared_control_env.core.safe_area import boundary_distance
+
+CONVERGED, ITERATION_LIMIT, FAILED = 0, 1, 2
+"""Statuses: stationary to :data:`TOLERANCE`, stopped before that, or not a finite number."""
+
+TOLERANCE = 1e-8
+"""Projected gradient, in commands scaled to their limits, under which the solution is stationary."""
+
+_ARMIJO = 1e-4
+_SHORTEST_STEP = 1e-3
+
+
+@jit
+def cost(U: np.ndarray, scene: np.ndarray, p: Parameters, work: np.ndarray) -> float:
+    """Cost of a command sequence, Eq. 13.
+
+    ::
+
+        J = sum_{i=1}^{H_p} R P(i)^2 + W (y(i) - y_target)^2 + H (v_x(i) - v_target)^2 + N r'(i)^2
+            + sum_{j=0}^{H_c-1} Q_a a(j)^2 + Q_delta delta(j)^2
+
+    with P the boundaries' field less its value at the cut-off and ``r'(i) = (r(i) - r(i-1)) / dt``.
+
+    Args:
+        U: commands ``[a, delta]``, shape (>= H_c, 2).
+        scene: record of :data:`records.SCENE`.
+        p: record or tuple of :class:`Parameters`.
+        work: record of :data:`condensing.WORKSPACE`.
+
+    Returns:
+        J.
+    """
+    w = p.automation
+    z, z_next = work.z, work.z_next
+    for i in range(6):
+        z[i] = scene.z[i]
+    total = 0.0
+    for i in range(w.H_p):
+        j = min(i, w.H_c - 1)
+        implicit_step(z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next)
+        r_b = boundary_distance(scene.area, z_next[S], z_next[Y])[0]
+        P = continuous_field(r_b, p.lateral)[0]
+        yaw_acceleration = (z_next[R] - z[R]) / p.task.dt
+        total += (
+            w.R * P * P
+            + w.W * (z_next[Y] - scene.y_target) ** 2
+            + w.H * (z_next[V_X] - scene.v_target) ** 2
+            + w.N * yaw_acceleration**2
+        )
+        z, z_next = z_next, z
+    for j in range(w.H_c):
+        total += w.Q_a * U[j, 0] ** 2 + w.Q_delta * U[j, 1] ** 2
+    return total
+
+
+@jit
+def linearise(U: np.ndarray, scene: np.ndarray, p: Parameters, work: np.ndarray) -> float:
+    """Quadratic model of half the cost about U: fills ``work.gradient`` and ``work.hessian``.
+
+    Args:
+        U, scene, p, work: as in :func:`cost`.
+
+    Returns:
+        The cost at U, as :func:`cost`.
+    """
+    w = p.automation
+    z, z_next = work.z, work.z_next
+    sens, sens_next = work.sensitivity, work.sensitivity_next
+    clear(work)
+    for i in range(6):
+        z[i] = scene.z[i]
+    total = 0.0
+    for i in range(w.H_p):
+        j = min(i, w.H_c - 1)
+        n = 2 * j + 2
+        implicit_step_jacobian(
+            z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next, work.A, work.B
+        )
+        propagate(work.A, work.B, sens, sens_next, n)
+        total += add_tracking(
+            work, w, p.task.dt, z, z_next, sens, sens_next, scene.y_target, scene.v_target, n
+        )
+        r_b, r_b_s, r_b_d = boundary_distance(scene.area, z_next[S], z_next[Y])
+        P, P_r = continuous_field(r_b, p.lateral)
+        if P > 0.0:
+            for c in range(n):
+                work.row[c] = P_r * (r_b_s * sens_next[S, c] + r_b_d * sens_next[Y, c])
+            total += add_square(work, w.R, P, n)
+        z, z_next = z_next, z
+        sens, sens_next = sens_next, sens
+    return total + add_effort(work, w, U)
+
+
+@jit
+def projected_gradient(U: np.ndarray, gradient: np.ndarray, H_c: int, limits: Limits) -> float:
+    """Stationarity of a bounded problem: ``max |u - clip(u - g)|`` in commands scaled to their limits.
+
+    Args:
+        U: commands, shape (>= H_c, 2).
+        gradient: of half the cost, shape (>= 2 H_c,).
+        H_c: commands in play.
+        limits: bounds.
+
+    Returns:
+        0 at a stationary point.
+    """
+    largest = 0.0
+    for j in range(H_c):
+        for channel in range(2):
+            bound = limits.a_max if channel == 0 else limits.delta_max
+            u, g = U[j, channel] / bound, gradient[2 * j + channel] * bound
+            largest = max(largest, abs(u - min(max(u - g, -1.0), 1.0)))
+    return largest
+
+
+@jit
+def _search_line(U: np.ndarray, value: float, scene: np.ndarray, p: Parameters, work: np.ndarray) -> float:
+    """Backtrack along ``work.step`` to a sufficient decrease and move U there; return the cost, or inf."""
+    n = 2 * p.automation.H_c
+    slope = 0.0
+    for c in range(n):
+        slope += 2.0 * work.gradient[c] * work.step[c]
+    length = 1.0
+    while length > _SHORTEST_STEP:
+        for c in range(n):
+            work.trial[c // 2, c % 2] = U[c // 2, c % 2] + length * work.step[c]
+        trial_value = cost(work.trial, scene, p, work)
+        if trial_value <= value + _ARMIJO * length * slope:
+            for c in range(n):
+                U[c // 2, c % 2] = work.trial[c // 2, c % 2]
+            return trial_value
+        length *= 0.5
+    return np.inf
+
+
+@jit
+def solve(
+    U: np.ndarray, scene: np.ndarray, p: Parameters, iterations: int, work: np.ndarray
+) -> tuple[int, int, float, float]:
+    """Minimise Eq. 13 over the bounded commands, from the guess U.
+
+    Args:
+        U: first guess, overwritten with the solution, shape (>= H_c, 2).
+        scene, p, work: as in :func:`cost`.
+        iterations: limit of Gauss-Newton iterations.
+
+    Returns:
+        Status, iterations done, projected gradient at the last linearisation, cost.
+    """
+    H_c = p.automation.H_c
+    n = 2 * H_c
+    value = residual = np.inf
+    for iteration in range(iterations):
+        value = linearise(U, scene, p, work)
+        residual = projected_gradient(U, work.gradient, H_c, p.limits)
+        if not (np.isfinite(value) and np.isfinite(residual)):
+            return FAILED, iteration, residual, value
+        if residual <= TOLERANCE:
+            return CONVERGED, iteration, residual, value
+        for c in range(n):
+            bound = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
+            work.low[c] = -bound - U[c // 2, c % 2]
+            work.high[c] = bound - U[c // 2, c % 2]
+        solve_box_qp(
+            n, work.hessian, work.gradient, work.low, work.high, work.step, work.factor, work.solution, work.bound
+        )
+        trial_value = _search_line(U, value, scene, p, work)
+        if not np.isfinite(trial_value):
+            return ITERATION_LIMIT, iteration + 1, residual, value
+        value = trial_value
+    return ITERATION_LIMIT, iterations, residual, value
+
+
+@jit
+def shift(U: np.ndarray, H_c: int) -> None:
+    """Warm start: move the H_c commands one step forward in place and repeat the last."""
+    for j in range(H_c - 1):
+        U[j, 0], U[j, 1] = U[j + 1, 0], U[j + 1, 1]

@@ -1,0 +1,108 @@
+"""The closed loop of one time step, in the two halves that the decision of alpha_a and the driver divides.
+
+``automate`` and ``monitor`` run on a perceived scene: the automation decides, the fault acts, the risk is
+assessed. ``blend`` runs once alpha_a and the driver's command are known: authority law, driver's lag, sum.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared_control_env.core import automation_mpc
+from shared_control_env.core.assessment import assess
+from shared_control_env.core.authority import apply_law
+from shared_control_env.core.degradation import degrade
+from shared_control_env.core.driver_lag import advance_lag
+from shared_control_env.core.jit import jit
+from shared_control_env.core.parameters import Parameters
+
+
+@jit
+def clear_memory(memory: np.ndarray) -> None:
+    """State of a loop that has not run: no command, full authority on display."""
+    memory.u_h_act[:] = 0.0
+    memory.u_h_des[:] = 0.0
+    memory.u[:] = 0.0
+    memory.alpha_a = 1.0
+
+
+@jit
+def clear_automation(memory: np.ndarray) -> None:
+    """State of an automation that has not run."""
+    memory.U[:] = 0.0
+    memory.u_a_des[:] = 0.0
+    memory.failures = 0
+
+
+@jit
+def automate(scene: np.ndarray, p: Parameters, memory: np.ndarray, work: np.ndarray) -> tuple[int, int, float]:
+    """The automation's desired command u_a,des (Eq. 13), left in ``memory.u_a_des``.
+
+    When the solver fails the last feasible command is held and the failure counted.
+
+    Args:
+        scene: record of :data:`records.SCENE`, its safe area found.
+        p: parameters.
+        memory: record of :data:`records.AUTOMATION_MEMORY`.
+        work: record of :data:`condensing.WORKSPACE`.
+
+    Returns:
+        Status, iterations and residual of :func:`automation_mpc.solve`.
+    """
+    iterations = p.authority.first_iterations if scene.k == 0 else p.authority.iterations
+    status, done, residual, _ = automation_mpc.solve(memory.U, scene, p, iterations, work)
+    if status == automation_mpc.FAILED:
+        memory.failures += 1
+        memory.U[:] = 0.0
+    else:
+        memory.u_a_des[0], memory.u_a_des[1] = memory.U[0, 0], memory.U[0, 1]
+        automation_mpc.shift(memory.U, p.automation.H_c)
+    return status, done, residual
+
+
+@jit
+def monitor(
+    scene: np.ndarray,
+    traffic: np.ndarray,
+    line: np.ndarray,
+    faults: np.ndarray,
+    p: Parameters,
+    signals: np.ndarray,
+) -> None:
+    """First half of a step, after the automation: its degradation u_a,f, the prediction xi, the risks r_y, r_x.
+
+    Args:
+        scene: record of :data:`records.SCENE`, its safe area found.
+        traffic: other vehicles, shape (n, 8).
+        line: reference line.
+        faults: rows of :func:`degradation.bias`, shape (m, 4).
+        p: parameters.
+        signals: record of :data:`records.SIGNALS` that holds ``u_a_des``, written.
+    """
+    degrade(signals.u_a_des, scene.t, faults, p.limits, signals.u_a_f)
+    assess(scene, traffic, line, p, signals)
+
+
+@jit
+def blend(
+    u_h_des: np.ndarray, alpha_a: float, p: Parameters, memory: np.ndarray, signals: np.ndarray
+) -> None:
+    """Second half of a step: u_a,act (Eq. 10), u_h,act (Eq. 16) and ``u = clip(u_a,act + u_h,act)``.
+
+    Args:
+        u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
+        alpha_a: authority in [0, 1].
+        p: parameters.
+        memory: record of :data:`records.MEMORY`; the driver's lag advances.
+        signals: record of :data:`records.SIGNALS`, completed.
+    """
+    signals.alpha_a = alpha_a
+    apply_law(p.authority.law, signals.u_a_des, signals.u_a_f, alpha_a, p.law, signals.u_a_act)
+    for i in range(2):
+        bound = p.limits.a_max if i == 0 else p.limits.delta_max
+        signals.u_h_des[i] = u_h_des[i]
+        signals.u_h_act[i] = memory.u_h_act[i]
+        signals.u[i] = min(max(signals.u_a_act[i] + signals.u_h_act[i], -bound), bound)
+        memory.u_h_des[i], memory.u[i] = u_h_des[i], signals.u[i]
+    advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
+    memory.alpha_a = alpha_a

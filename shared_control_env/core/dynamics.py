@@ -1,0 +1,250 @@
+"""Three-degree-of-freedom dynamic bicycle (Eq. 11), from standstill to motorway speed.
+
+State ``z = [s, y, psi, v_x, v_y, r]``: position along and to the left of a path of curvature kappa,
+heading relative to it, longitudinal and lateral velocity in the body frame, yaw rate. With
+``kappa = 0`` the path is a straight line and ``[s, y, psi]`` is Eq. 11's ``[x, y, psi]``: the plant
+runs in the Cartesian frame with kappa = 0, the predictive controllers in the road frame.
+Axes follow ISO 8855: x forward, y to the left, positive steering and yaw rate turn left.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+
+from shared_control_env.core.jit import jit
+from shared_control_env.core.parameters import VehicleParameters
+
+S, Y, PSI, V_X, V_Y, R = range(6)
+"""Places in the state vector."""
+
+PLANT_SUBSTEPS = 2
+"""Extrapolated substeps of one 0.05 s plant step; the error against an exact solution is in the tests."""
+
+
+@jit
+def derivative(
+    z: np.ndarray, a: float, delta: float, kappa: float, vehicle: VehicleParameters
+) -> np.ndarray:
+    """Right-hand side of Eq. 11 in the road frame.
+
+    ::
+
+        alpha_f = (v_y + l_f r) / v_x - delta        F_cf = -C_f alpha_f
+        alpha_r = (v_y - l_r r) / v_x                F_cr = -C_r alpha_r
+        v_x' = r v_y + a
+        v_y' = -r v_x + 2 (F_cf cos(delta) + F_cr) / m
+        r'   = 2 (l_f F_cf - l_r F_cr) / I_z
+        s'   = (v_x cos(psi) - v_y sin(psi)) / (1 - kappa y)
+        y'   = v_x sin(psi) + v_y cos(psi)
+        psi' = r - kappa s'
+
+    Args:
+        z: state, shape (6,); v_x must not be 0.
+        a: acceleration command [m/s^2].
+        delta: front steering angle [rad].
+        kappa: curvature of the path [1/m]; 0 for the Cartesian frame.
+        vehicle: parameters.
+
+    Returns:
+        Time derivative of the state, shape (6,).
+    """
+    y, psi, v_x, v_y, r = z[Y], z[PSI], z[V_X], z[V_Y], z[R]
+    F_cf = -vehicle.C_f * ((v_y + vehicle.l_f * r) / v_x - delta)
+    F_cr = -vehicle.C_r * ((v_y - vehicle.l_r * r) / v_x)
+    dz = np.empty(6)
+    dz[V_X] = r * v_y + a
+    dz[V_Y] = -r * v_x + 2.0 * (F_cf * cos(delta) + F_cr) / vehicle.m
+    dz[R] = 2.0 * (vehicle.l_f * F_cf - vehicle.l_r * F_cr) / vehicle.I_z
+    dz[S] = (v_x * cos(psi) - v_y * sin(psi)) / (1.0 - kappa * y)
+    dz[Y] = v_x * sin(psi) + v_y * cos(psi)
+    dz[PSI] = r - kappa * dz[S]
+    return dz
+
+
+@jit
+def implicit_step(
+    z: np.ndarray,
+    a: float,
+    delta: float,
+    kappa: float,
+    h: float,
+    vehicle: VehicleParameters,
+    z_next: np.ndarray,
+) -> None:
+    """One step of length h, implicit in the lateral motion: the discrete model f^d of Eq. 12.
+
+    One explicit 0.05 s step is unstable below about 15 m/s (yaw damping grows as 1/v_x), and the slip
+    angles are singular at standstill. As in Ge et al. (arXiv 2011.09612) the lateral equations are
+    taken at the end of the step and multiplied by v_x, which removes both; unlike there, v_y and r
+    are solved together, since the coupled backward Euler step is stable wherever Eq. 11 is.
+    The speed stops at zero: braking never reverses the car.
+
+    ::
+
+        v     = max(0, v_x + h (a + r v_y))
+        v v_y+ = v v_y + h (-r+ v^2 - (K_f c (v_y+ + l_f r+) + K_r (v_y+ - l_r r+)) / m + K_f c delta v / m)
+        v r+   = v r   + h (-(l_f K_f (v_y+ + l_f r+) - l_r K_r (v_y+ - l_r r+)) / I_z + l_f K_f delta v / I_z)
+        s'    = (v cos(psi) - v_y+ sin(psi)) / (1 - kappa y)
+        psi+  = psi + h (r+ - kappa s')        s+ = s + h s'
+        y+    = y + h (v sin(psi+) + v_y+ cos(psi+))
+
+    with ``K = 2 C`` an axle and ``c = cos(delta)``. First order in h.
+
+    Args:
+        z: state, shape (6,).
+        a: acceleration [m/s^2].
+        delta: front steering angle [rad].
+        kappa: curvature of the path [1/m].
+        h: step [s].
+        vehicle: parameters.
+        z_next: the new state is written here, shape (6,); may be ``z`` itself.
+    """
+    y, psi, v_y, r = z[Y], z[PSI], z[V_Y], z[R]
+    v = max(0.0, z[V_X] + h * (a + r * v_y))
+    m11, m12, m21, m22, b1, b2 = _lateral_system(v, v_y, r, delta, h, vehicle)
+    det = m11 * m22 - m12 * m21
+    v_y_next = (b1 * m22 - b2 * m12) / det
+    r_next = (b2 * m11 - b1 * m21) / det
+    s_rate = (v * cos(psi) - v_y_next * sin(psi)) / (1.0 - kappa * y)
+    psi_next = psi + h * (r_next - kappa * s_rate)
+    z_next[S] = z[S] + h * s_rate
+    z_next[Y] = y + h * (v * sin(psi_next) + v_y_next * cos(psi_next))
+    z_next[PSI] = psi_next
+    z_next[V_X] = v
+    z_next[V_Y] = v_y_next
+    z_next[R] = r_next
+
+
+@jit
+def _lateral_system(
+    v: float, v_y: float, r: float, delta: float, h: float, vehicle: VehicleParameters
+) -> tuple[float, float, float, float, float, float]:
+    """Matrix and right-hand side of the two lateral equations of :func:`implicit_step`."""
+    K_f, K_r = 2.0 * vehicle.C_f, 2.0 * vehicle.C_r
+    l_f, l_r, m, I_z = vehicle.l_f, vehicle.l_r, vehicle.m, vehicle.I_z
+    K_fc = K_f * cos(delta)
+    m11 = v + h * (K_fc + K_r) / m
+    m12 = h * (v * v + (K_fc * l_f - K_r * l_r) / m)
+    m21 = h * (l_f * K_f - l_r * K_r) / I_z
+    m22 = v + h * (l_f * l_f * K_f + l_r * l_r * K_r) / I_z
+    b1 = v * v_y + h * K_fc * delta * v / m
+    b2 = v * r + h * l_f * K_f * delta * v / I_z
+    return m11, m12, m21, m22, b1, b2
+
+
+@jit
+def implicit_step_jacobian(
+    z: np.ndarray,
+    a: float,
+    delta: float,
+    kappa: float,
+    h: float,
+    vehicle: VehicleParameters,
+    z_next: np.ndarray,
+    A: np.ndarray,
+    B: np.ndarray,
+) -> None:
+    """:func:`implicit_step` with its derivatives ``A = dz+/dz`` and ``B = dz+/d[a, delta]``.
+
+    The lateral pair solves ``M x = b``; its derivative solves ``M dx = db - dM x``. Where braking holds
+    the speed at zero its derivatives vanish.
+
+    Args:
+        z, a, delta, kappa, h, vehicle, z_next: as in :func:`implicit_step`.
+        A: written, shape (6, 6).
+        B: written, shape (6, 2).
+    """
+    implicit_step(z, a, delta, kappa, h, vehicle, z_next)
+    y, psi, v_y, r = z[Y], z[PSI], z[V_Y], z[R]
+    v, v_y1, r1, psi1 = z_next[V_X], z_next[V_Y], z_next[R], z_next[PSI]
+    # At rest the derivative is that of starting off, or a controller would never start.
+    moving = 1.0 if z[V_X] + h * (a + r * v_y) >= 0.0 else 0.0
+    m11, m12, m21, m22, _, _ = _lateral_system(v, v_y, r, delta, h, vehicle)
+    det = m11 * m22 - m12 * m21
+    K_f, c, sn = 2.0 * vehicle.C_f, cos(delta), sin(delta)
+
+    # Derivatives of (v_y+, r+) with respect to the new speed v, then v_y, r and delta.
+    e1 = v_y + h * K_f * c * delta / vehicle.m - v_y1 - 2.0 * h * v * r1
+    e2 = r + h * vehicle.l_f * K_f * delta / vehicle.I_z - r1
+    V_v, R_v = (e1 * m22 - e2 * m12) / det, (e2 * m11 - e1 * m21) / det
+    V_vy, R_vy = v * m22 / det, -v * m21 / det
+    V_r, R_r = -v * m12 / det, v * m11 / det
+    e1 = h * K_f / vehicle.m * (v * (c - delta * sn) + sn * (v_y1 + vehicle.l_f * r1))
+    e2 = h * vehicle.l_f * K_f * v / vehicle.I_z
+    V_d, R_d = (e1 * m22 - e2 * m12) / det, (e2 * m11 - e1 * m21) / det
+
+    A[:] = 0.0
+    B[:] = 0.0
+    v_vx, v_vy, v_r, v_a = moving, moving * h * r, moving * h * v_y, moving * h
+    A[V_X, V_X], A[V_X, V_Y], A[V_X, R], B[V_X, 0] = v_vx, v_vy, v_r, v_a
+    A[V_Y, V_X], A[V_Y, V_Y], A[V_Y, R] = V_v * v_vx, V_vy + V_v * v_vy, V_r + V_v * v_r
+    A[R, V_X], A[R, V_Y], A[R, R] = R_v * v_vx, R_vy + R_v * v_vy, R_r + R_v * v_r
+    B[V_Y, 0], B[V_Y, 1], B[R, 0], B[R, 1] = V_v * v_a, V_d, R_v * v_a, R_d
+
+    # s', psi+ and y+ by the chain rule through v, v_y+ and r+.
+    q = 1.0 - kappa * y
+    cp, sp = cos(psi), sin(psi)
+    s_rate = (v * cp - v_y1 * sp) / q
+    s_rate_y = kappa * s_rate / q
+    s_rate_psi = -(v * sp + v_y1 * cp) / q
+    cp1, sp1 = cos(psi1), sin(psi1)
+    y_psi1 = v * cp1 - v_y1 * sp1
+    A[S, S], A[Y, Y], A[PSI, PSI] = 1.0, 1.0, 1.0
+    A[S, Y], A[S, PSI] = h * s_rate_y, h * s_rate_psi
+    A[PSI, Y], A[PSI, PSI] = -h * kappa * s_rate_y, 1.0 - h * kappa * s_rate_psi
+    A[Y, Y] += h * y_psi1 * A[PSI, Y]
+    A[Y, PSI] = h * y_psi1 * A[PSI, PSI]
+    for j in (V_X, V_Y, R):
+        ds = (A[V_X, j] * cp - A[V_Y, j] * sp) / q
+        A[S, j] = h * ds
+        A[PSI, j] = h * (A[R, j] - kappa * ds)
+        A[Y, j] = h * (A[V_X, j] * sp1 + A[V_Y, j] * cp1 + y_psi1 * A[PSI, j])
+    for j in range(2):
+        ds = (B[V_X, j] * cp - B[V_Y, j] * sp) / q
+        B[S, j] = h * ds
+        B[PSI, j] = h * (B[R, j] - kappa * ds)
+        B[Y, j] = h * (B[V_X, j] * sp1 + B[V_Y, j] * cp1 + y_psi1 * B[PSI, j])
+
+
+@jit
+def extrapolated_step(
+    z: np.ndarray, a: float, delta: float, h: float, vehicle: VehicleParameters, work: np.ndarray
+) -> None:
+    """Advance ``z`` in place by h in the Cartesian frame, second order in h.
+
+    Richardson extrapolation of the implicit step, ``z(h) = 2 f(h/2, f(h/2, z)) - f(h, z)``, which keeps
+    its damping of the stiff lateral motion at any step (Hairer & Wanner, Solving ODEs II, Section IV.9).
+
+    Args:
+        z: state [x, y, psi, v_x, v_y, r], shape (6,), overwritten.
+        a, delta: command [m/s^2, rad].
+        h: step [s].
+        vehicle: parameters.
+        work: scratch, shape (2, 6).
+    """
+    coarse, fine = work[0], work[1]
+    implicit_step(z, a, delta, 0.0, h, vehicle, coarse)
+    implicit_step(z, a, delta, 0.0, 0.5 * h, vehicle, fine)
+    implicit_step(fine, a, delta, 0.0, 0.5 * h, vehicle, fine)
+    for i in range(6):
+        z[i] = 2.0 * fine[i] - coarse[i]
+    z[V_X] = max(0.0, z[V_X])
+
+
+@jit
+def plant_step(
+    z: np.ndarray, a: float, delta: float, dt: float, vehicle: VehicleParameters, work: np.ndarray
+) -> None:
+    """Advance the plant by dt in place: :data:`PLANT_SUBSTEPS` extrapolated steps under a held command.
+
+    Args:
+        z: state [x, y, psi, v_x, v_y, r], shape (6,), overwritten.
+        a, delta: command [m/s^2, rad], held over the step.
+        dt: step [s].
+        vehicle: parameters.
+        work: scratch, shape (2, 6).
+    """
+    for _ in range(PLANT_SUBSTEPS):
+        extrapolated_step(z, a, delta, dt / PLANT_SUBSTEPS, vehicle, work)

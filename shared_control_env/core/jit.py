@@ -1,0 +1,73 @@
+"""The one numba decorator of the core: its disk cache, and the notice that a cold compilation gives."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import njit
+from numba.core import event
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_COMPILED_SOURCES = (Path(__file__).parent, Path(__file__).parent.parent / "vector")
+
+
+def jit(function: F) -> F:
+    """Compile with a disk cache.
+
+    Divisions follow IEEE 754 as in NumPy. Neither fast-math nor threads are used within a function, so
+    that rollouts repeat to the bit.
+    """
+    dispatcher = njit(cache=True, error_model="numpy", nogil=True)(function)
+    _drop_stale_cache(dispatcher.stats.cache_path)
+    return cast(F, dispatcher)
+
+
+@cache
+def _drop_stale_cache(directory: str) -> None:
+    """Empty a cache directory that older sources filled.
+
+    Numba compares only a function's own file, yet inlines what it calls: after a change in
+    one file the callers in others would silently keep the old equation.
+    """
+    sources = sorted(path for folder in _COMPILED_SOURCES for path in folder.glob("*.py"))
+    digest = sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    stamp = Path(directory) / "shared_control_env.sha256"
+    if stamp.is_file() and stamp.read_text() == digest:
+        return
+    try:
+        for pattern in ("*.nbi", "*.nbc"):
+            for path in Path(directory).glob(pattern):
+                path.unlink(missing_ok=True)
+        stamp.parent.mkdir(parents=True, exist_ok=True)
+        stamp.write_text(digest)
+    except OSError:  # A directory that cannot be written cannot hold a stale cache of ours either.
+        return
+
+
+class _ColdCompileNotice(event.Listener):
+    """Say once on stderr that the first run compiles, so that it does not look hung."""
+
+    said = False
+
+    def on_start(self, event: Any) -> None:
+        function = event.data["dispatcher"].py_func
+        if not self.said and function.__module__.startswith("shared_control_env"):
+            self.said = True
+            print(
+                "shared_control_env: compiling the numerical core for this machine, once "
+                "(under a minute); later runs read it from numba's cache.",
+                file=sys.stderr,
+                flush=True,
+            )
+
+    def on_end(self, event: Any) -> None:
+        """Nothing is due when a compilation ends."""
+
+
+event.register("numba:compile", _ColdCompileNotice())

@@ -1,0 +1,284 @@
+"""Every parameter of the model with its unit, range, default and source.
+
+The classes are named tuples: immutable, documented, and passed as they are to the compiled functions.
+Sources: *paper* is Huang et al., arXiv 2103.04563, with the table or equation; *ours* marks a choice
+that the paper leaves open. All units are SI, angles in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Interval
+
+Positive = Annotated[float, Gt(0.0)]
+NonNegative = Annotated[float, Ge(0.0)]
+Count = Annotated[int, Gt(0)]
+Fraction = Annotated[float, Interval(ge=0.0, le=1.0)]
+
+
+class VehicleParameters(NamedTuple):
+    """Three-degree-of-freedom bicycle with linear tyres (Eq. 11).
+
+    Attributes:
+        m: mass [kg]; paper, Table III.
+        I_z: yaw moment of inertia [kg m^2]; paper, Table III.
+        l_f: distance from the centre of mass to the front axle [m]; paper, Table III.
+        l_r: distance from the centre of mass to the rear axle [m]; paper, Table III.
+        C_f: cornering stiffness of one front tyre [N/rad]; ours (the paper prints none).
+        C_r: cornering stiffness of one rear tyre [N/rad]; ours (the paper prints none).
+        length: body length [m]; highway-env's vehicle.
+        width: body width v_w [m]; paper, Table V.
+    """
+
+    m: Positive = 2000.0
+    I_z: Positive = 1300.0
+    l_f: Positive = 1.21
+    l_r: Positive = 1.05
+    C_f: Positive = 60_000.0
+    C_r: Positive = 60_000.0
+    length: Positive = 5.0
+    width: Positive = 2.0
+
+
+class Limits(NamedTuple):
+    """Physical limits of every command (Eq. 14).
+
+    Attributes:
+        a_max: largest acceleration and deceleration [m/s^2]; paper, Section VI.
+        delta_max: largest front steering angle [rad]; paper, Section VI (30 deg).
+    """
+
+    a_max: Positive = 5.0
+    delta_max: Annotated[float, Interval(gt=0.0, lt=math.pi / 2)] = math.radians(30.0)
+
+
+class PredictiveParameters(NamedTuple):
+    """Horizon and weights of both predictive controllers (Eq. 13, 15).
+
+    The paper prints the horizons but no weights. These were chosen so that the healthy automation
+    settles a 1 m lane error in about 2 s without overshoot and tracks a 3 m/s speed step in about
+    3 s; the same values serve the driver, as the paper says.
+
+    Attributes:
+        H_p: prediction horizon [steps]; paper, Section VI.
+        H_c: control horizon [steps], the last command is held after it; paper, Section VI.
+        W: weight of the lateral error squared [1/m^2]; ours.
+        H: weight of the speed error squared [s^2/m^2]; ours.
+        N: weight of the yaw acceleration squared [s^4/rad^2]; ours.
+        Q_a: weight of the acceleration command squared [s^4/m^2]; ours.
+        Q_delta: weight of the steering command squared [1/rad^2]; ours.
+        R: weight of the potential-field value squared [-]; ours (automation only).
+    """
+
+    H_p: Annotated[int, Interval(ge=1, le=50)] = 10
+    H_c: Annotated[int, Interval(ge=1, le=10)] = 3
+    W: NonNegative = 1.0
+    H: NonNegative = 0.1
+    N: NonNegative = 0.01
+    Q_a: Positive = 0.05
+    Q_delta: Positive = 1.0
+    R: NonNegative = 1e-4
+
+
+class SafeAreaParameters(NamedTuple):
+    """Extent of the driving region (Table I).
+
+    Attributes:
+        look_ahead: length of the region when no vehicle precedes [m]; ours.
+        d_o: clearance kept behind the preceding vehicle [m]; paper, Table V.
+    """
+
+    look_ahead: Positive = 60.0
+    d_o: NonNegative = 2.0
+
+
+class LateralRiskParameters(NamedTuple):
+    """Artificial potential field of the safe area's boundaries (Eq. 2, 3).
+
+    Attributes:
+        alpha_f: height of the field [-]; paper, Table V.
+        sigma_y: width of the field [m]; paper, Table V.
+        d_c: safety margin [m]; paper, Table V.
+        v_w: vehicle width [m]; paper, Table V.
+    """
+
+    alpha_f: Positive = 30.0
+    sigma_y: Positive = 1.0
+    d_c: NonNegative = 0.8
+    v_w: Positive = 2.0
+
+
+class LongitudinalRiskParameters(NamedTuple):
+    """Dynamic potential field of the neighbours (Eq. 5-8).
+
+    Attributes:
+        alpha: height of the relative-speed field [-]; paper, Table V.
+        A_f: height of the distance field [-]; paper, Table V.
+        sigma_x: width of the distance field [m], used where ``graded`` is false; paper, Table V.
+        graded: take sigma_x = 2 d^s instead (the text's "2 d_o" read with the distance of Eq. 8); ours.
+        b: shape of the distance field [-]; paper, Table V.
+        a_max: largest deceleration of all vehicles [m/s^2]; paper, Table V.
+        t_r: reaction time [s]; paper, Table V.
+        t_i: build-up time of the deceleration [s]; paper, Table V.
+        d_o: clearance between stopped vehicles [m]; paper, Table V.
+        w_f: weight of the follower [-]; paper, Table V (lane keeping).
+        w_l: weight of the leader [-]; paper, Table V (lane keeping).
+        w_p: weight of the preceding vehicle [-]; paper, Table V (lane keeping).
+        bumper_to_bumper: subtract one vehicle length from the distance of the centres; ours.
+    """
+
+    alpha: Positive = 10.0
+    A_f: Positive = 2.0
+    sigma_x: Positive = 4.0
+    graded: bool = True
+    b: Positive = 2.0
+    a_max: Positive = 7.0
+    t_r: NonNegative = 0.1
+    t_i: NonNegative = 0.1
+    d_o: NonNegative = 2.0
+    w_f: Fraction = 0.1
+    w_l: Fraction = 0.2
+    w_p: Fraction = 0.7
+    bumper_to_bumper: bool = False
+
+
+class LawParameters(NamedTuple):
+    """Tolerances of the first line of Eq. 10, in physical units; both ours.
+
+    Attributes:
+        tolerance_a: |a_f - a_des| still counted as equal [m/s^2].
+        tolerance_delta: |delta_f - delta_des| still counted as equal [rad].
+    """
+
+    tolerance_a: NonNegative = 0.01
+    tolerance_delta: NonNegative = 0.001
+
+
+class DriverLagParameters(NamedTuple):
+    """Neuromuscular response of the driver (Eq. 16).
+
+    Attributes:
+        K_h: proportional gain [-]; paper, Section VI (0 takes the hands off the wheel).
+        T_h: time constant [s]; paper, Section VI.
+    """
+
+    K_h: NonNegative = 1.0
+    T_h: Positive = 0.2
+
+
+IDENTIFIED_DRIVERS: dict[str, DriverLagParameters] = {
+    "driver_1": DriverLagParameters(0.95, 0.15),
+    "driver_2": DriverLagParameters(1.15, 0.21),
+    "driver_3": DriverLagParameters(1.10, 0.14),
+    "driver_4": DriverLagParameters(1.20, 0.18),
+    "driver_5": DriverLagParameters(0.98, 0.19),
+    "average": DriverLagParameters(1.08, 0.17),
+}
+"""The five drivers identified in the paper's Table IV, and their average."""
+
+
+class RewardParameters(NamedTuple):
+    """Weights of the reward's terms, all ours; every term is documented in :mod:`core.reward`.
+
+    Attributes:
+        progress: weight of the progress along the lane [-].
+        lane: weight of the squared lateral error [-].
+        speed: weight of the speed error [-].
+        effort: weight of the driver's squared command [-].
+        comfort: weight of jerk and lateral acceleration squared [-].
+        conflict: weight of the driver working against the automation [-].
+        failure: weight of the step that ends in a collision or off the road [-].
+    """
+
+    progress: NonNegative = 1.0
+    lane: NonNegative = 0.5
+    speed: NonNegative = 0.5
+    effort: NonNegative = 0.1
+    comfort: NonNegative = 0.05
+    conflict: NonNegative = 0.1
+    failure: NonNegative = 50.0
+
+
+def critical_speed(vehicle: VehicleParameters) -> float:
+    """Speed above which an oversteering car is unstable [m/s]; infinite for an understeering one.
+
+    ``v_crit = L sqrt(2 C_f C_r / (m (l_f C_f - l_r C_r)))`` with ``L = l_f + l_r`` and the
+    stiffness per tyre, two tyres an axle (Rajamani, Vehicle Dynamics and Control, Section 3.3).
+    """
+    oversteer = vehicle.l_f * vehicle.C_f - vehicle.l_r * vehicle.C_r
+    if oversteer <= 0.0:
+        return math.inf
+    wheelbase = vehicle.l_f + vehicle.l_r
+    return wheelbase * math.sqrt(2.0 * vehicle.C_f * vehicle.C_r / (vehicle.m * oversteer))
+
+
+class TaskParameters(NamedTuple):
+    """What is to be driven, and how often it is decided.
+
+    Attributes:
+        dt: time step of all controllers [s]; paper, Section VI (0.05 s).
+        tau_p: horizon of the CTRA prediction [s]; paper, Section III-A.
+        lane_width: width of a lane [m]; spec of the cases (4 m).
+        road_low: right edge of the road in the road frame [m].
+        road_high: left edge of the road in the road frame [m].
+        y_target: lateral position of the lane to keep [m].
+        target_speed: speed to drive where no slower vehicle precedes [m/s]; Case 1 (15 m/s).
+    """
+
+    dt: Positive = 0.05
+    tau_p: Positive = 0.5
+    lane_width: Positive = 4.0
+    road_low: float = -2.0
+    road_high: float = 6.0
+    y_target: float = 0.0
+    target_speed: Positive = 15.0
+
+
+class AuthorityParameters(NamedTuple):
+    """Choice of the fuzzy operators and of the authority law, by code.
+
+    Attributes:
+        law: index in :data:`core.authority.LAWS`; paper, Eq. 10.
+        operators: index in :data:`core.fuzzy.OPERATORS`; ours.
+        iterations: Gauss-Newton iterations of the automation per step; ours.
+        first_iterations: the same at the first step, from a cold start; ours.
+    """
+
+    law: int = 0
+    operators: int = 0
+    iterations: int = 3
+    first_iterations: int = 5
+
+
+class Parameters(NamedTuple):
+    """Everything that one environment is set up with; the parts are documented in their classes.
+
+    Attributes:
+        vehicle: the ego vehicle.
+        limits: limits of the commands.
+        automation: weights of the automation's predictive controller.
+        driver: weights of the driver's predictive controller; the paper's are the same.
+        safe_area: extent of the driving region.
+        lateral: lateral risk.
+        longitudinal: longitudinal risk.
+        law: tolerances of the authority law.
+        lag: the driver's response.
+        reward: weights of the reward.
+        task: lane, speed and time step.
+        authority: operators, law and solver iterations.
+    """
+
+    vehicle: VehicleParameters = VehicleParameters()
+    limits: Limits = Limits()
+    automation: PredictiveParameters = PredictiveParameters()
+    driver: PredictiveParameters = PredictiveParameters()
+    safe_area: SafeAreaParameters = SafeAreaParameters()
+    lateral: LateralRiskParameters = LateralRiskParameters()
+    longitudinal: LongitudinalRiskParameters = LongitudinalRiskParameters()
+    law: LawParameters = LawParameters()
+    lag: DriverLagParameters = DriverLagParameters()
+    reward: RewardParameters = RewardParameters()
+    task: TaskParameters = TaskParameters()
+    authority: AuthorityParameters = AuthorityParameters()

@@ -1,0 +1,461 @@
+"""The safe area C by constrained Delaunay triangulation (Table I), in the road frame (s, d).
+
+The driving region is the rectangle of road ahead, from the ego to d_o behind the preceding vehicle or
+to a fixed look-ahead; vehicles inside are holes. Its triangles are searched from the ego's to the
+final region; the sequence found is C, and its left and right edges are the upper and lower boundary.
+Working in the road frame makes a curve a rectangle too; it neglects the bending of the road within
+one vehicle length (5 cm at a radius of 60 m).
+"""
+
+from __future__ import annotations
+
+from math import hypot
+
+import numpy as np
+import shapely
+
+from shared_control_env.core.jit import jit
+from shared_control_env.core.records import MAX_CHAIN
+
+REACHED, BLOCKED = 0, 1
+"""Outcomes of the search: the final region was found, or no passage as wide as the vehicle leads to it."""
+
+_ON_LINE = 1e-9
+"""Distance under which a vertex lies on the rear or front line of the region [m]."""
+
+
+def triangulate(start: float, end: float, low: float, high: float, holes: np.ndarray) -> np.ndarray:
+    """Constrained Delaunay triangles of a rectangle less its holes (Table I, step 1).
+
+    Shapely raises when holes overlap or cross the shell, so their union is subtracted first.
+
+    Args:
+        start, end: extent along the road [m], end > start.
+        low, high: extent across [m], high > low.
+        holes: corners of the vehicles, shape (n, 4, 2) [m].
+
+    Returns:
+        Triangles, shape (m, 3, 2); m = 0 when the holes cover the region.
+    """
+    region = shapely.box(start, low, end, high)
+    if holes.shape[0]:
+        region = region.difference(shapely.union_all(shapely.polygons(holes)))
+    triangles = shapely.constrained_delaunay_triangles(region)
+    return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].copy()
+
+
+def find_safe_area(
+    region: np.ndarray, d: float, holes: np.ndarray, min_width: float, area: np.ndarray
+) -> None:
+    """Safe area of a rectangular driving region (Table I).
+
+    Args:
+        region: start, end along the road and low, high across it [m], shape (4,).
+        d: the ego's lateral position [m]; outside the region its nearest point counts.
+        holes: corners of the vehicles, shape (n, 4, 2) [m].
+        min_width: narrowest passage that counts as one [m].
+        area: record of :data:`records.SAFE_AREA`, written.
+    """
+    triangles = triangulate(region[0], region[1], region[2], region[3], holes)
+    search_triangles(triangles, region[0], region[1], d, min_width, area)
+
+
+@jit
+def search_triangles(
+    triangles: np.ndarray, start: float, end: float, d: float, min_width: float, area: np.ndarray
+) -> None:
+    """Sequence of triangles from the ego to the final region, and its boundaries (Table I, steps 2-4).
+
+    The table says only to search adjacent triangles until the final one is found. Readings: the fewest
+    triangles, or the shortest way. The fewest depends on which diagonal a rectangle happens to get,
+    so the shortest way through the midpoints of the shared edges is taken (Dijkstra). A way narrower
+    than the vehicle is none. Without a way to the front line the outcome is BLOCKED, and the area is
+    the union of all triangles that can be entered.
+
+    Args:
+        triangles: shape (m, 3, 2), in any order and orientation.
+        start, end: rear and front line of the region [m].
+        d: lateral position of the ego on the rear line [m].
+        min_width: narrowest passage [m].
+        area: record of :data:`records.SAFE_AREA`, written.
+    """
+    orient(triangles)
+    neighbours = adjacency(triangles)
+    first, rear_edge = _edge_on_line(triangles, start, d)
+    area.start = start
+    if first < 0:
+        _start_chains(area, start, d)
+        area.end, area.outcome = start, BLOCKED
+        return
+    parent, entry, goal, front_edge = _search(
+        triangles, neighbours, first, rear_edge, start, end, d, min_width
+    )
+    if goal >= 0:
+        area.outcome = REACHED
+        _trace_sequence(triangles, parent, entry, goal, front_edge, area)
+    else:
+        area.outcome = BLOCKED
+        _trace_reachable(triangles, neighbours, parent, entry, first, area)
+    area.end = max(area.lower[MAX_CHAIN - 1, 0], area.upper[MAX_CHAIN - 1, 0])
+
+
+@jit
+def orient(triangles: np.ndarray) -> None:
+    """Make every triangle counter-clockwise, in place; shape (m, 3, 2)."""
+    for i in range(triangles.shape[0]):
+        a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
+        if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) < 0.0:
+            for k in range(2):
+                b[k], c[k] = c[k], b[k]
+
+
+@jit
+def _left_and_right(triangles: np.ndarray, i: int, edge: int) -> tuple[float, float, float, float]:
+    """Ends of an edge as seen when leaving a counter-clockwise triangle over it: left s, d, right s, d."""
+    right, left = triangles[i, edge], triangles[i, (edge + 1) % 3]
+    return left[0], left[1], right[0], right[1]
+
+
+@jit
+def _same_edge(triangles: np.ndarray, i: int, edge: int, j: int) -> int:
+    """Which edge of triangle j is the given edge of triangle i, or -1."""
+    ls, ld, rs, rd = _left_and_right(triangles, i, edge)
+    for other in range(3):
+        a, b = triangles[j, other], triangles[j, (other + 1) % 3]
+        if a[0] == ls and a[1] == ld and b[0] == rs and b[1] == rd:
+            return other
+    return -1
+
+
+@jit
+def adjacency(triangles: np.ndarray) -> np.ndarray:
+    """Adjacency (Table I, step 3) as a list: ``[i, edge]`` is the triangle over that edge, or -1.
+
+    Args:
+        triangles: counter-clockwise, shape (m, 3, 2).
+
+    Returns:
+        Integer array, shape (m, 3); the table's matrix D(i, j) is 1 where j is in row i.
+    """
+    n = triangles.shape[0]
+    neighbours = np.full((n, 3), -1)
+    for i in range(n):
+        for edge in range(3):
+            for j in range(n):
+                if _same_edge(triangles, i, edge, j) >= 0:
+                    neighbours[i, edge] = j
+    return neighbours
+
+
+@jit
+def _edge_on_line(triangles: np.ndarray, line: float, d: float) -> tuple[int, int]:
+    """Triangle and edge on the line s = line that hold, or are nearest to, the lateral position d; or -1, -1."""
+    triangle, found, nearest = -1, -1, np.inf
+    for i in range(triangles.shape[0]):
+        for edge in range(3):
+            ls, ld, rs, rd = _left_and_right(triangles, i, edge)
+            if abs(ls - line) < _ON_LINE and abs(rs - line) < _ON_LINE:
+                gap = max(0.0, min(ld, rd) - d, d - max(ld, rd))
+                if gap < nearest:
+                    triangle, found, nearest = i, edge, gap
+    return triangle, found
+
+
+@jit
+def _edge_distance(triangles: np.ndarray, i: int, edge: int, s: float, d: float) -> float:
+    """Distance from a point to an edge."""
+    a, b = triangles[i, edge], triangles[i, (edge + 1) % 3]
+    es, ed = b[0] - a[0], b[1] - a[1]
+    along = ((s - a[0]) * es + (d - a[1]) * ed) / (es * es + ed * ed)
+    along = min(max(along, 0.0), 1.0)
+    return hypot(s - a[0] - along * es, d - a[1] - along * ed)
+
+
+@jit
+def clearance(
+    triangles: np.ndarray, neighbours: np.ndarray, i: int, entry: int, leave: int, start: float, end: float
+) -> float:
+    """Width of the passage through a triangle from one edge to another [m].
+
+    The way bends around the vertex that both edges share. Its width is the distance from there to the nearest
+    boundary on the other side, looked for through the open edges (Demyen & Buro, Efficient
+    Triangulation-Based Pathfinding, AAAI 2006), and at most the length of either edge.
+
+    Args:
+        triangles, neighbours: of :func:`adjacency`.
+        i: the triangle.
+        entry, leave: its two edges.
+        start, end: rear and front line, which are open.
+    """
+    ls, ld, rs, rd = _left_and_right(triangles, i, entry)
+    width = hypot(ls - rs, ld - rd)
+    ls, ld, rs, rd = _left_and_right(triangles, i, leave)
+    width = min(width, hypot(ls - rs, ld - rd))
+    across = 3 - entry - leave
+    s, d = triangles[i, (across + 2) % 3, 0], triangles[i, (across + 2) % 3, 1]
+    stack = np.empty((3 * triangles.shape[0], 2), dtype=np.int64)
+    stack[0, 0], stack[0, 1] = i, across
+    size = 1
+    while size > 0:
+        size -= 1
+        t, edge = stack[size, 0], stack[size, 1]
+        distance = _edge_distance(triangles, t, edge, s, d)
+        if distance >= width:
+            continue
+        j = neighbours[t, edge]
+        if j < 0:
+            ls, ld, rs, rd = _left_and_right(triangles, t, edge)
+            on_rear = abs(ls - start) < _ON_LINE and abs(rs - start) < _ON_LINE
+            on_front = abs(ls - end) < _ON_LINE and abs(rs - end) < _ON_LINE
+            if not on_rear and not on_front:
+                width = distance
+            continue
+        back = _same_edge(triangles, t, edge, j)
+        for k in range(1, 3):
+            stack[size, 0], stack[size, 1] = j, (back + k) % 3
+            size += 1
+    return width
+
+
+@jit
+def _search(
+    triangles: np.ndarray,
+    neighbours: np.ndarray,
+    first: int,
+    rear_edge: int,
+    start: float,
+    end: float,
+    d: float,
+    min_width: float,
+) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """Dijkstra from the ego's triangle through the midpoints of the edges crossed.
+
+    Returns:
+        For each triangle the one it is entered from and the edge it is entered by, or -1; the
+        triangle in which the front line is reached and its edge there, or -1.
+    """
+    n = triangles.shape[0]
+    distance = np.full(n, np.inf)
+    parent, entry = np.full(n, -1), np.full(n, -1)
+    at = np.zeros((n, 2))
+    done = np.zeros(n, dtype=np.bool_)
+    distance[first], entry[first], at[first, 0], at[first, 1] = 0.0, rear_edge, start, d
+    goal, front_edge, goal_distance = -1, -1, np.inf
+    for _ in range(n):
+        i, best = -1, np.inf
+        for j in range(n):
+            if not done[j] and distance[j] < best:
+                i, best = j, distance[j]
+        if i < 0:
+            break
+        done[i] = True
+        for edge in range(3):
+            if edge == entry[i]:
+                continue
+            ls, ld, rs, rd = _left_and_right(triangles, i, edge)
+            on_front = abs(ls - end) < _ON_LINE and abs(rs - end) < _ON_LINE
+            j = neighbours[i, edge]
+            if j < 0 and not on_front:
+                continue
+            ms, md = 0.5 * (ls + rs), 0.5 * (ld + rd)
+            way = distance[i] + hypot(ms - at[i, 0], md - at[i, 1])
+            if way >= (goal_distance if j < 0 else distance[j]):
+                continue
+            if clearance(triangles, neighbours, i, entry[i], edge, start, end) < min_width:
+                continue
+            if j < 0:
+                goal, front_edge, goal_distance = i, edge, way
+            else:
+                distance[j], parent[j], entry[j] = way, i, _same_edge(triangles, i, edge, j)
+                at[j, 0], at[j, 1] = ms, md
+    return parent, entry, goal, front_edge
+
+
+@jit
+def _start_chains(area: np.ndarray, s: float, d: float) -> None:
+    """Set both boundaries to a single point, the form of an empty area."""
+    area.lower[:, 0] = s
+    area.lower[:, 1] = d
+    area.upper[:, 0] = s
+    area.upper[:, 1] = d
+
+
+@jit
+def _append(chain: np.ndarray, n: int, s: float, d: float) -> int:
+    """Append a vertex unless it repeats the last or the chain is full; return the new length."""
+    if (n > 0 and chain[n - 1, 0] == s and chain[n - 1, 1] == d) or n == MAX_CHAIN:
+        return n
+    chain[n, 0], chain[n, 1] = s, d
+    return n + 1
+
+
+@jit
+def _finish_chains(area: np.ndarray, n_lower: int, n_upper: int) -> None:
+    """Repeat the last vertices to the arrays' ends; a chain that filled its array may be cut: blocked there."""
+    if n_lower == MAX_CHAIN or n_upper == MAX_CHAIN:
+        area.outcome = BLOCKED
+    for k in range(n_lower, MAX_CHAIN):
+        area.lower[k, 0], area.lower[k, 1] = area.lower[n_lower - 1, 0], area.lower[n_lower - 1, 1]
+    for k in range(n_upper, MAX_CHAIN):
+        area.upper[k, 0], area.upper[k, 1] = area.upper[n_upper - 1, 0], area.upper[n_upper - 1, 1]
+
+
+@jit
+def _trace_sequence(
+    triangles: np.ndarray, parent: np.ndarray, entry: np.ndarray, goal: int, front_edge: int, area: np.ndarray
+) -> None:
+    """Boundaries of the sequence: left and right ends of every edge it crosses, from rear to front."""
+    sequence = np.empty(triangles.shape[0], dtype=np.int64)
+    length = 0
+    i = goal
+    while i >= 0:
+        sequence[length] = i
+        length += 1
+        i = parent[i]
+    n_lower = n_upper = 0
+    for k in range(length - 1, -1, -1):
+        i = sequence[k]
+        # Entering over an edge mirrors leaving over it: its left end lies to the right of the way.
+        rs, rd, ls, ld = _left_and_right(triangles, i, entry[i])
+        n_lower = _append(area.lower, n_lower, rs, rd)
+        n_upper = _append(area.upper, n_upper, ls, ld)
+    ls, ld, rs, rd = _left_and_right(triangles, goal, front_edge)
+    n_lower = _append(area.lower, n_lower, rs, rd)
+    n_upper = _append(area.upper, n_upper, ls, ld)
+    _finish_chains(area, n_lower, n_upper)
+
+
+@jit
+def _trace_reachable(
+    triangles: np.ndarray,
+    neighbours: np.ndarray,
+    parent: np.ndarray,
+    entry: np.ndarray,
+    first: int,
+    area: np.ndarray,
+) -> None:
+    """Outline of all triangles entered, from the right end of the rear edge around to its left end.
+
+    The outline is split at its vertex furthest ahead into the lower and the upper boundary.
+    """
+    n = triangles.shape[0]
+    ring = np.empty((3 * n + 2, 2))
+    ring[0] = triangles[first, (entry[first] + 1) % 3]
+    size = 1
+    stack = np.empty((3 * n, 2), dtype=np.int64)
+    stack[0, 0], stack[0, 1] = first, 2
+    stack[1, 0], stack[1, 1] = first, 1
+    depth = 2
+    while depth > 0:
+        depth -= 1
+        i = stack[depth, 0]
+        edge = (entry[i] + stack[depth, 1]) % 3
+        j = neighbours[i, edge]
+        if j >= 0 and parent[j] == i and _same_edge(triangles, i, edge, j) == entry[j]:
+            for turn in (2, 1):
+                stack[depth, 0], stack[depth, 1] = j, turn
+                depth += 1
+        else:
+            ring[size] = triangles[i, (edge + 1) % 3]
+            size += 1
+    furthest = 0
+    for k in range(size):
+        if ring[k, 0] > ring[furthest, 0]:
+            furthest = k
+    n_lower = n_upper = 0
+    for k in range(furthest + 1):
+        n_lower = _append(area.lower, n_lower, ring[k, 0], ring[k, 1])
+    for k in range(size - 1, furthest - 1, -1):
+        n_upper = _append(area.upper, n_upper, ring[k, 0], ring[k, 1])
+    _finish_chains(area, n_lower, n_upper)
+
+
+@jit
+def _on_open_end(area: np.ndarray, s: float) -> float:
+    """s clamped to the area's open ends: behind the ego, and at the final region where that was reached.
+
+    Both are lines across the road, not boundaries; the boundaries count as going straight on there.
+    What lies beyond a blocked end stays outside.
+    """
+    if area.outcome == REACHED:
+        s = min(s, area.end - _ON_LINE)
+    return max(s, area.start)
+
+
+@jit
+def _crossings(chain: np.ndarray, s: float, d: float) -> int:
+    """Segments of a chain above the point (s, d), for the even-odd rule."""
+    count = 0
+    for k in range(MAX_CHAIN - 1):
+        s1, d1, s2, d2 = chain[k, 0], chain[k, 1], chain[k + 1, 0], chain[k + 1, 1]
+        if s1 == s2 and d1 == d2:
+            break
+        if (s1 <= s) != (s2 <= s) and d1 + (d2 - d1) * (s - s1) / (s2 - s1) > d:
+            count += 1
+    return count
+
+
+@jit
+def _nearest_on_chain(chain: np.ndarray, s: float, d: float) -> tuple[float, float, float]:
+    """Squared distance from (s, d) to a chain, and the vector from its nearest point."""
+    best, best_s, best_d = np.inf, 0.0, 0.0
+    for k in range(MAX_CHAIN - 1):
+        s1, d1 = chain[k, 0], chain[k, 1]
+        es, ed = chain[k + 1, 0] - s1, chain[k + 1, 1] - d1
+        square = es * es + ed * ed
+        if square == 0.0:
+            if k > 0:
+                break
+            square = 1.0
+        along = min(max(((s - s1) * es + (d - d1) * ed) / square, 0.0), 1.0)
+        ds, dd = s - s1 - along * es, d - d1 - along * ed
+        if ds * ds + dd * dd < best:
+            best, best_s, best_d = ds * ds + dd * dd, ds, dd
+    return best, best_s, best_d
+
+
+@jit
+def boundary_distance(area: np.ndarray, s: float, d: float) -> tuple[float, float, float]:
+    """Distance r_b from a point to the nearer boundary of C; 0 outside C.
+
+    Args:
+        area: record of :data:`records.SAFE_AREA`.
+        s, d: the point [m].
+
+    Returns:
+        r_b [m] and its gradient with respect to s and d.
+    """
+    s = _on_open_end(area, s)
+    if (_crossings(area.lower, s, d) + _crossings(area.upper, s, d)) % 2 == 0:
+        return 0.0, 0.0, 0.0
+    square, ds, dd = _nearest_on_chain(area.lower, s, d)
+    square_upper, ds_upper, dd_upper = _nearest_on_chain(area.upper, s, d)
+    if square_upper < square:
+        square, ds, dd = square_upper, ds_upper, dd_upper
+    r_b = square**0.5
+    if r_b == 0.0:
+        return 0.0, 0.0, 0.0
+    return r_b, ds / r_b, dd / r_b
+
+
+@jit
+def lateral_bounds(area: np.ndarray, s: float) -> tuple[float, float]:
+    """Lateral extent of C at path length s: the lowest upper and the highest lower boundary there.
+
+    Args:
+        area: record of :data:`records.SAFE_AREA`.
+        s: path length [m]; beyond either end the end counts.
+
+    Returns:
+        ``low, high`` [m].
+    """
+    s = min(max(s, area.start), area.end - _ON_LINE)
+    low, high = -np.inf, np.inf
+    for k in range(MAX_CHAIN - 1):
+        s1, d1, s2, d2 = area.lower[k, 0], area.lower[k, 1], area.lower[k + 1, 0], area.lower[k + 1, 1]
+        if (s1 <= s) != (s2 <= s):
+            low = max(low, d1 + (d2 - d1) * (s - s1) / (s2 - s1))
+        s1, d1, s2, d2 = area.upper[k, 0], area.upper[k, 1], area.upper[k + 1, 0], area.upper[k + 1, 1]
+        if (s1 <= s) != (s2 <= s):
+            high = min(high, d1 + (d2 - d1) * (s - s1) / (s2 - s1))
+    return low, high

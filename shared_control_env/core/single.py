@@ -1,0 +1,154 @@
+"""Entry points for one environment, called from Python.
+
+Numba takes an array of any type in half a microsecond but a record by itself in ten, so these take
+arrays of no dimension and hand their one record, ``array[()]``, to the functions that hold the model.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared_control_env.core import (
+    automation_mpc,
+    closed_loop,
+    driver_qp,
+    dynamics,
+    fuzzy,
+    observation,
+    reward,
+    safe_area,
+    scene as scenes,
+)
+from shared_control_env.core.jit import jit
+
+
+@jit
+def sense(
+    k: int,
+    state: np.ndarray,
+    traffic: np.ndarray,
+    line: np.ndarray,
+    parameters: np.ndarray,
+    scene: np.ndarray,
+    corners: np.ndarray,
+) -> int:
+    """:func:`scene.perceive`, then :func:`scene.holes_in_region`; returns the number of holes."""
+    scenes.perceive(k, state, traffic, line, parameters[()], scene[()])
+    return scenes.holes_in_region(traffic, line, scene[()].region, corners)
+
+
+@jit
+def search(triangles: np.ndarray, parameters: np.ndarray, scene: np.ndarray) -> None:
+    """:func:`safe_area.search_triangles` of a scene's driving region."""
+    s, p = scene[()], parameters[()]
+    safe_area.search_triangles(triangles, s.region[0], s.region[1], s.z[1], p.vehicle.width, s.area)
+
+
+@jit
+def clear_memory(memory: np.ndarray) -> None:
+    """:func:`closed_loop.clear_memory`."""
+    closed_loop.clear_memory(memory[()])
+
+
+@jit
+def clear_automation(memory: np.ndarray) -> None:
+    """:func:`closed_loop.clear_automation`."""
+    closed_loop.clear_automation(memory[()])
+
+
+@jit
+def automate(
+    scene: np.ndarray, parameters: np.ndarray, memory: np.ndarray, work: np.ndarray
+) -> tuple[int, int, float]:
+    """:func:`closed_loop.automate`."""
+    return closed_loop.automate(scene[()], parameters[()], memory[()], work[()])
+
+
+@jit
+def solve_automation(
+    U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, iterations: int, work: np.ndarray
+) -> tuple[int, int, float, float]:
+    """:func:`automation_mpc.solve`."""
+    return automation_mpc.solve(U, scene[()], parameters[()], iterations, work[()])
+
+
+@jit
+def automation_cost(U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, work: np.ndarray) -> float:
+    """:func:`automation_mpc.cost`."""
+    return automation_mpc.cost(U, scene[()], parameters[()], work[()])
+
+
+@jit
+def monitor(
+    scene: np.ndarray,
+    traffic: np.ndarray,
+    line: np.ndarray,
+    faults: np.ndarray,
+    parameters: np.ndarray,
+    signals: np.ndarray,
+) -> None:
+    """:func:`closed_loop.monitor`."""
+    closed_loop.monitor(scene[()], traffic, line, faults, parameters[()], signals[()])
+
+
+@jit
+def fuzzy_authority(signals: np.ndarray, parameters: np.ndarray) -> float:
+    """alpha_a = FIS(r_x, r_y) of a monitored step (Eq. 9)."""
+    s = signals[()]
+    return fuzzy.authority(s.r_x, s.r_y, parameters[()].authority.operators)
+
+
+@jit
+def blend(
+    u_h_des: np.ndarray, alpha_a: float, parameters: np.ndarray, memory: np.ndarray, signals: np.ndarray
+) -> None:
+    """:func:`closed_loop.blend`."""
+    closed_loop.blend(u_h_des, alpha_a, parameters[()], memory[()], signals[()])
+
+
+@jit
+def drive(
+    state: np.ndarray, a: float, delta: float, dt: float, parameters: np.ndarray, work: np.ndarray
+) -> None:
+    """:func:`dynamics.plant_step`."""
+    dynamics.plant_step(state, a, delta, dt, parameters[()].vehicle, work)
+
+
+@jit
+def observe(
+    scene: np.ndarray, memory: np.ndarray, line: np.ndarray, parameters: np.ndarray, out: np.ndarray
+) -> None:
+    """:func:`observation.observe`."""
+    observation.observe(scene[()], memory[()], line, parameters[()], out)
+
+
+@jit
+def reward_terms(
+    previous: np.ndarray,
+    scene: np.ndarray,
+    signals: np.ndarray,
+    last_a: float,
+    failed: bool,
+    parameters: np.ndarray,
+    terms: np.ndarray,
+) -> float:
+    """:func:`reward.reward_terms`; returns their weighted sum."""
+    p = parameters[()]
+    reward.reward_terms(previous[()], scene[()], signals[()], last_a, failed, p, terms)
+    return reward.weighted_sum(terms, p.reward)
+
+
+@jit
+def build_program(
+    scene: np.ndarray,
+    u_last: np.ndarray,
+    parameters: np.ndarray,
+    work: np.ndarray,
+    P: np.ndarray,
+    q: np.ndarray,
+    A: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+) -> None:
+    """:func:`driver_qp.build_program`."""
+    driver_qp.build_program(scene[()], u_last, parameters[()], work[()], P, q, A, low, high)

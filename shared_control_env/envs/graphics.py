@@ -1,0 +1,171 @@
+"""Rendering: highway-env's world with safe area, prediction and path, over a panel of gauges."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pygame
+from highway_env.envs.common.graphics import EnvViewer
+from highway_env.road.graphics import RoadGraphics
+
+from shared_control_env.core.road import point_at
+from shared_control_env.core.safe_area import REACHED
+
+if TYPE_CHECKING:
+    from shared_control_env.envs.shared_control import SharedControlEnv
+
+PANEL_HEIGHT = 160
+"""Height of the gauges' panel under the road [px]."""
+
+BACKGROUND, INK, FAINT = (250, 250, 250), (30, 30, 30), (205, 205, 205)
+AUTOMATION, DEGRADED, DRIVER = (0, 110, 200), (215, 45, 45), (20, 140, 60)
+SAFE, BLOCKED = (70, 200, 120, 70), (230, 150, 40, 90)
+PREDICTION, PATH = (0, 230, 60), (255, 210, 0)
+RISK, AUTHORITY = (220, 110, 0), (90, 60, 190)
+
+
+class SharedControlViewer(EnvViewer):
+    """Viewer of one environment.
+
+    highway-env draws y downwards; here y points left of the driving direction, so the world's picture is
+    flipped once drawn. Text is drawn after that.
+    """
+
+    def __init__(self, env: SharedControlEnv) -> None:
+        config = env.config
+        width, height = config["screen_width"], config["screen_height"]
+        super().__init__(env, {**config, "screen_height": height - PANEL_HEIGHT, "offscreen_rendering": True})
+        self.offscreen = config["offscreen_rendering"]
+        self.frame_surface = pygame.Surface((width, height))
+        if not self.offscreen:
+            self.screen = pygame.display.set_mode((width, height))
+        self.font = pygame.font.Font(None, 20)
+
+    def display(self) -> None:
+        """Draw the present scene on the frame and, in human mode, on the window."""
+        self._draw_world()
+        self._draw_panel()
+        if not self.offscreen:
+            self.screen.blit(self.frame_surface, (0, 0))
+            if self.env.config["real_time_rendering"]:
+                self.clock.tick(self.env.config["policy_frequency"])
+            pygame.display.flip()
+
+    def get_image(self) -> np.ndarray:
+        """The frame as an array of shape (height, width, 3), bytes."""
+        return np.ascontiguousarray(np.moveaxis(pygame.surfarray.array3d(self.frame_surface), 0, 1))
+
+    def close(self) -> None:
+        """Close the window; other environments' viewers stay alive."""
+        if not self.offscreen:
+            pygame.display.quit()
+
+    def _draw_world(self) -> None:
+        surface, env = self.sim_surface, self.env
+        surface.move_display_window_to(self.window_position())
+        RoadGraphics.display(env.road, surface)
+        self._draw_safe_area()
+        if len(env.path) > 1:
+            pygame.draw.lines(surface, PATH, False, [surface.vec2pix(point) for point in env.path], 2)
+        RoadGraphics.display_traffic(
+            env.road, surface, simulation_frequency=env.config["simulation_frequency"], offscreen=True
+        )
+        self._draw_prediction()
+        self.frame_surface.blit(pygame.transform.flip(surface, False, True), (0, 0))
+
+    def _draw_safe_area(self) -> None:
+        """Fill C between its boundaries, in the road frame's curves."""
+        area, surface = self.env.scene["area"], self.sim_surface
+        outline = np.vstack([_curved(area["lower"]), _curved(area["upper"])[::-1]])
+        if len(outline) < 3:
+            return
+        points = [surface.vec2pix(point_at(self.env.line, s, d)[:2]) for s, d in outline]
+        layer = pygame.Surface(surface.get_size(), pygame.SRCALPHA)
+        pygame.draw.polygon(layer, SAFE if area["outcome"] == REACHED else BLOCKED, points)
+        pygame.draw.polygon(layer, (*SAFE[:3], 255), points, 1)
+        surface.blit(layer, (0, 0))
+
+    def _draw_prediction(self) -> None:
+        """The CTRA prediction as a green diamond."""
+        x, y = self.sim_surface.vec2pix(self.env.signals["prediction"][:2])
+        diamond = [(x - 9, y), (x, y - 9), (x + 9, y), (x, y + 9)]
+        pygame.draw.polygon(self.sim_surface, PREDICTION, diamond)
+        pygame.draw.polygon(self.sim_surface, INK, diamond, 1)
+
+    def _draw_panel(self) -> None:
+        """Gauges of risk and authority on the left, of the commands on the right."""
+        env, signals = self.env, self.env.signals
+        width, top = self.frame_surface.get_width(), self.frame_surface.get_height() - PANEL_HEIGHT
+        pygame.draw.rect(self.frame_surface, BACKGROUND, (0, top, width, PANEL_HEIGHT))
+        active = bool(env.faults.shape[0] and (env.faults[:, 1] <= env.scene["t"]).any())
+        self._write(
+            f"t = {env.scene['t']:.2f} s     v = {env.vehicle.speed:.1f} m/s     "
+            f"y = {env.scene['z'][1] - env.scene['y_target']:+.2f} m     law: {env.settings.authority.law}     "
+            f"fault: {'active' if active else 'none'}",
+            (14, top + 10),
+        )
+        for i, (name, value, colour) in enumerate(
+            (
+                ("longitudinal risk r_x", signals["r_x"], RISK),
+                ("lateral risk r_y", signals["r_y"], RISK),
+                ("authority alpha_a", signals["alpha_a"], AUTHORITY),
+            )
+        ):
+            self._bar(name, float(value), (14, top + 42 + 36 * i), 0.32 * width, colour, False)
+        limits = env.parameters["limits"]
+        for channel, (title, unit, bound, shown) in enumerate(
+            (
+                ("acceleration", "m/s2", float(limits["a_max"]), 1.0),
+                ("steering", "deg", float(limits["delta_max"]), 180.0 / np.pi),
+            )
+        ):
+            left = (0.37 + 0.32 * channel) * width
+            for i, (name, key, colour) in enumerate(
+                (
+                    ("automation", "u_a_des", AUTOMATION),
+                    ("degraded", "u_a_f", DEGRADED),
+                    ("driver", "u_h_act", DRIVER),
+                )
+            ):
+                value = float(signals[key][channel])
+                label = f"{title}, {name}: {value * shown:+.2f} {unit}"
+                self._bar(label, value / bound, (left, top + 42 + 36 * i), 0.3 * width, colour, True)
+
+    def _bar(
+        self,
+        label: str,
+        value: float,
+        corner: tuple[float, float],
+        width: float,
+        colour: tuple[int, int, int],
+        centred: bool,
+    ) -> None:
+        """A labelled bar of a value in [0, 1], or in [-1, 1] about its middle (left of it positive)."""
+        x, y = corner
+        self._write(label if centred else f"{label} = {value:.2f}", (x, y))
+        pygame.draw.rect(self.frame_surface, FAINT, (x, y + 17, width, 9))
+        value = min(max(value, -1.0), 1.0)
+        if centred:
+            middle = x + 0.5 * width
+            length = 0.5 * width * abs(value)
+            pygame.draw.rect(
+                self.frame_surface, colour, (middle if value > 0 else middle - length, y + 17, length, 9)
+            )
+            pygame.draw.line(self.frame_surface, INK, (middle, y + 15), (middle, y + 27))
+        else:
+            pygame.draw.rect(self.frame_surface, colour, (x, y + 17, width * value, 9))
+
+    def _write(self, text: str, corner: tuple[float, float]) -> None:
+        self.frame_surface.blit(self.font.render(text, True, INK), corner)
+
+
+def _curved(chain: np.ndarray, spacing: float = 2.0) -> np.ndarray:
+    """A boundary without its repeats, with points every ``spacing`` metres so that it bends with the road."""
+    steps = np.hypot(*np.diff(chain, axis=0).T)
+    chain = chain[: np.count_nonzero(steps) + 1]
+    pieces = [
+        np.linspace(a, b, max(2, int(np.hypot(*(b - a)) / spacing) + 1))
+        for a, b in zip(chain[:-1], chain[1:], strict=True)
+    ]
+    return np.vstack(pieces) if pieces else chain

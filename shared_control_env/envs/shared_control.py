@@ -1,0 +1,325 @@
+"""The environment: a degraded automation and a driver share one car on a highway-env road."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+from highway_env import utils
+from highway_env.envs.common.abstract import AbstractEnv
+from highway_env.vehicle.graphics import VehicleGraphics
+
+from shared_control_env.controllers.automation import Automation
+from shared_control_env.core import reward, single
+from shared_control_env.core.degradation import ONSET
+from shared_control_env.core.records import MEMORY, SCENE, SIGNALS, pack
+from shared_control_env.core.road import curvature_at, point_at, reference_line
+from shared_control_env.core.safe_area import triangulate
+from shared_control_env.envs import config as configuration
+from shared_control_env.envs.action import SlotAction
+from shared_control_env.envs.graphics import SharedControlViewer
+from shared_control_env.envs.observation import DriverObservation
+from shared_control_env.envs.roads import LineRoad
+from shared_control_env.envs.vehicles import EgoVehicle
+
+LEAD_IN = 50.0
+"""Straight road behind the ego's start [m]."""
+
+
+class SharedControlEnv(AbstractEnv):
+    """Human-machine shared control of one car whose automation degrades.
+
+    A step runs the signals of one time step k: the automation's desired command u_a,des and its degraded
+    form u_a,f are known before it; the action brings the driver's u_h,des and the authority alpha_a; law, driver
+    lag and sum follow; the vehicle moves to k + 1, where the next scene is perceived and planned for.
+
+    The Cartesian frame is ISO 8855: x forward, y to the left, angles and steering positive to the left, as in
+    the paper. highway-env's formulas hold in it unchanged; only its pictures, which draw y downwards, are
+    flipped by the viewer.
+
+    The bare environment's action has both slots open (:class:`SlotAction`); the wrappers ``AuthorityLimiter`` and
+    ``DriverModel`` bind them.
+
+    Attributes:
+        settings: checked settings; ``config`` is the same as a plain dict.
+        parameters: record of :class:`Parameters` that the core runs with.
+        scene: record of :data:`records.SCENE`, the present scene with its safe area.
+        signals: record of :data:`records.SIGNALS`: planned for the present scene after a reset or step.
+        memory: record of :data:`records.MEMORY`.
+        command_limits: largest acceleration and steering [m/s^2, rad], shape (2,).
+        automation: any object with ``reset()`` and ``act(scene) -> Solution``.
+        observation: the last observation.
+        path: Cartesian positions of the ego so far, shape (k + 1, 2) [m].
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
+
+    def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
+        # highway-env updates metadata, which is the class's own dict, at every reset.
+        self.metadata = dict(type(self).metadata)
+        self.scene, self._previous = np.zeros((), SCENE), np.zeros((), SCENE)
+        self.signals = np.zeros((), SIGNALS)
+        self.memory = np.zeros((), MEMORY)
+        super().__init__(config=config, render_mode=render_mode)
+
+    @classmethod
+    def default_config(cls) -> dict[str, Any]:
+        """All settings with their defaults (:class:`configuration.Settings`)."""
+        return configuration.plain(configuration.Settings())
+
+    def configure(self, config: dict[str, Any] | None) -> None:
+        """Merge changes into the config, nested dicts included, and check the whole.
+
+        Raises:
+            ValueError: naming the key and the nearest valid one, or the field, its value and its range.
+        """
+        merged = configuration.merge(self.config, config or {})
+        if merged["offscreen_rendering"] is None:
+            merged["offscreen_rendering"] = self.render_mode != "human"
+        self.settings = configuration.check(merged)
+        self._vehicle_class = self._checked_vehicle_class()
+        self.config = configuration.plain(self.settings)
+
+    def _checked_vehicle_class(self) -> Any:
+        path = self.settings.other_vehicles_type
+        try:
+            return utils.class_from_path(path)
+        except (ValueError, ImportError, AttributeError) as error:
+            raise ValueError(
+                f"config['other_vehicles_type'] = {path!r} is not the path of a class, such as "
+                f"{configuration.Settings().other_vehicles_type!r} ({error})"
+            ) from None
+
+    def define_spaces(self) -> None:
+        """Build action and observation types once: new spaces would forget the user's seed."""
+        if self.action_space is None:
+            self.observation_type = DriverObservation(self)
+            self.action_type = SlotAction(self)
+            self.observation_space = self.observation_type.space()
+            self.action_space = self.action_type.space()
+
+    def update_metadata(self, video_real_time_ratio: float = 1.0) -> None:
+        """One frame a decision: videos run at the speed of the drive."""
+        self.metadata["render_fps"] = round(video_real_time_ratio * self.settings.policy_frequency)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            seed: of the environment's generator.
+            options: ``{"config": {...}}`` changes settings from this episode on, as in highway-env.
+
+        Returns:
+            Observation and info. The signals in info are those planned for k = 0; nothing is applied yet.
+
+        Raises:
+            ValueError: for unknown options or wrong settings.
+        """
+        gym.Env.reset(self, seed=seed)
+        unknown = set(options or {}) - {"config"}
+        if unknown:
+            raise ValueError(f"options has the unknown key(s) {sorted(unknown)}; valid is 'config'")
+        if options and "config" in options:
+            self.configure(options["config"])
+        self.update_metadata()
+        self.steps, self.done = 0, False
+        self._reset()
+        self._perceive_and_plan()
+        self.observation = self.observation_type.observe()
+        info = self._info()
+        if self.render_mode == "human":
+            self.render()
+        return self.observation.copy(), info
+
+    def _reset(self) -> None:
+        """Make road, vehicles and controllers from the settings."""
+        settings = self.settings
+        self.parameters = pack(configuration.parameters_of(settings))
+        self.command_limits = np.array(list(self.parameters["limits"][()]))
+        self.faults = configuration.fault_rows(settings)
+        segments = [(segment.length, segment.curvature) for segment in settings.road.segments]
+        self.line = reference_line(segments, lead_in=LEAD_IN)
+        self.road = LineRoad(
+            self.line,
+            settings.road.lanes,
+            settings.road.lane_width,
+            np_random=self.np_random,
+            neighbour_vehicles_connected_lanes=settings.neighbour_vehicles_connected_lanes,
+        )
+        self._place_vehicles()
+        self.traffic = self.road.update_rows()[1:]
+        self._corners = np.zeros((len(self.traffic), 4, 2))
+        self._terms = np.zeros(len(reward.TERMS))
+        self._path = np.zeros((settings.steps + 1, 2))
+        self.automation = Automation(self.parameters)
+        self.automation.reset()
+        single.clear_memory(self.memory)
+        self.signals[()] = np.zeros((), SIGNALS)
+        self.signals["alpha_a"] = self.memory["alpha_a"]
+        self._in_lane = True
+        self._lane_departures = 0
+
+    def _place_vehicles(self) -> None:
+        settings = self.settings
+        d = settings.lane_centre(settings.ego.lane) + settings.ego.lateral_offset
+        x, y, psi = point_at(self.line, 0.0, d)
+        yaw_rate = settings.ego.speed * curvature_at(self.line, 0.0, d)
+        ego = EgoVehicle(
+            self.road,
+            (x, y),
+            psi,
+            settings.ego.speed,
+            yaw_rate,
+            settings.task.target_speed,
+            self.parameters,
+        )
+        ego.color = VehicleGraphics.EGO_COLOR
+        self.controlled_vehicles = [ego]
+        self.road.vehicles = [ego]
+        for vehicle in settings.vehicles:
+            x, y, psi = point_at(self.line, vehicle.position, settings.lane_centre(vehicle.lane))
+            self.road.vehicles.append(
+                self._vehicle_class(self.road, (x, y), heading=psi, speed=vehicle.speed)
+            )
+
+    def _perceive_and_plan(self) -> None:
+        """Perceive the scene, find its safe area, let the automation decide, degrade it, assess the risk."""
+        p, scene, signals, state = self.parameters, self.scene, self.signals, self.vehicle.array
+        self._path[self.steps] = state[:2]
+        count = single.sense(self.steps, state, self.traffic, self.line, p, scene, self._corners)
+        single.search(triangulate(*scene["region"].tolist(), self._corners[:count]), p, scene)
+        self.solution = self.automation.act(scene)
+        signals["u_a_des"] = self.solution.command
+        signals["status"], signals["iterations"] = self.solution.status, self.solution.iterations
+        signals["residual"] = self.solution.dual_residual
+        single.monitor(scene, self.traffic, self.line, self.faults, p, signals)
+
+    def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Drive one time step.
+
+        Args:
+            action: see :class:`SlotAction`.
+
+        Returns:
+            Observation, reward, terminated (collision or off the road), truncated (duration) and info.
+
+        Raises:
+            ValueError: if the action is malformed; nothing has moved then.
+        """
+        command, alpha_a = self.action_type.decode(action)
+        last_a = float(self.memory["u"][0])
+        single.blend(command, alpha_a, self.parameters, self.memory, self.signals)
+        self._simulate(self.signals["u"])
+        played = self.signals.copy()
+        applied = self._signal_info(played)
+        self._previous[()] = self.scene
+        self._perceive_and_plan()
+        terminated = self._is_terminated()
+        value = single.reward_terms(
+            self._previous, self.scene, played, last_a, terminated, self.parameters, self._terms
+        )
+        self._count_departures()
+        self.observation = self.observation_type.observe()
+        info = {**applied, **self._outcome_info()}
+        if self.render_mode == "human":
+            self.render()
+        return self.observation.copy(), value, terminated, self._is_truncated(), info
+
+    def _simulate(self, u: np.ndarray) -> None:
+        """Move all vehicles through one decision's simulation steps under a constant command."""
+        self.vehicle.act({"acceleration": float(u[0]), "steering": float(u[1])})
+        frames = self.settings.simulation_frequency // self.settings.policy_frequency
+        for _ in range(frames):
+            self.road.act()
+            self.road.step(1.0 / self.settings.simulation_frequency)
+        self.steps += 1
+
+    def _is_terminated(self) -> bool:
+        """Collision, or the ego's centre off the road."""
+        return bool(self.vehicle.crashed) or not self._on_road()
+
+    def _is_truncated(self) -> bool:
+        """End of the duration, counted in whole steps."""
+        return self.steps >= self.settings.steps
+
+    def _on_road(self) -> bool:
+        d, task = self.scene["z"][1], self.parameters["task"]
+        return bool(task["road_low"] <= d <= task["road_high"])
+
+    def _count_departures(self) -> None:
+        """Count each time the ego's centre leaves the lane to keep."""
+        offset = abs(self.scene["z"][1] - self.scene["y_target"])
+        in_lane = bool(offset <= 0.5 * self.parameters["task"]["lane_width"])
+        self._lane_departures += self._in_lane and not in_lane
+        self._in_lane = in_lane
+
+    def _info(self, obs: Any = None, action: Any = None) -> dict[str, Any]:
+        """Info of a reset; the parent's also carries an unseeded sample of the action, which is left out."""
+        self._terms[:] = 0.0
+        return {**self._signal_info(self.signals.copy()), **self._outcome_info()}
+
+    def _signal_info(self, signals: np.ndarray) -> dict[str, Any]:
+        """Signals of the scene's time step, plain numbers and arrays; ``signals`` is a copy, whose views are given."""
+        scene = self.scene.copy()
+        area = scene["area"]
+        return {
+            "k": int(scene["k"]),
+            "t": float(scene["t"]),
+            "state": scene["state"],
+            "z": scene["z"],
+            "y_target": float(scene["y_target"]),
+            "v_target": float(scene["v_target"]),
+            "u_a_des": signals["u_a_des"],
+            "u_a_f": signals["u_a_f"],
+            "u_a_act": signals["u_a_act"],
+            "u_h_des": signals["u_h_des"],
+            "u_h_act": signals["u_h_act"],
+            "u": signals["u"],
+            "r_x": float(signals["r_x"]),
+            "r_y": float(signals["r_y"]),
+            "alpha_a": float(signals["alpha_a"]),
+            "prediction": signals["prediction"],
+            "prediction_road": signals["prediction_road"],
+            "safe_area_lower": area["lower"],
+            "safe_area_upper": area["upper"],
+            "safe_area_outcome": int(area["outcome"]),
+            "fault": signals["u_a_f"] - signals["u_a_des"],
+            "fault_active": bool(self.faults.shape[0] and (self.faults[:, ONSET] <= scene["t"]).any()),
+            "automation": {
+                "status": int(signals["status"]),
+                "iterations": int(signals["iterations"]),
+                "residual": float(signals["residual"]),
+                "failures": int(self.automation.failures),
+            },
+        }
+
+    def _outcome_info(self) -> dict[str, Any]:
+        """State after the step, and the unweighted reward terms."""
+        return {
+            "speed": self.vehicle.speed,
+            "crashed": bool(self.vehicle.crashed),
+            "on_road": self._on_road(),
+            "in_lane": self._in_lane,
+            "lane_departures": int(self._lane_departures),
+            "rewards": dict(zip(reward.TERMS, self._terms.tolist(), strict=True)),
+        }
+
+    @property
+    def path(self) -> np.ndarray:
+        """Cartesian positions of the ego so far, shape (k + 1, 2) [m]."""
+        return self._path[: self.steps + 1]
+
+    def render(self) -> np.ndarray | None:
+        """Draw the present scene: a frame in ``rgb_array`` mode, the window in ``human`` mode."""
+        if self.render_mode is None:
+            return super().render()
+        if self.viewer is None:
+            self.viewer = SharedControlViewer(self)
+        self.viewer.display()
+        if self.render_mode == "human":
+            self.viewer.handle_events()
+            return None
+        return self.viewer.get_image()

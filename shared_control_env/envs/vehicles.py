@@ -1,0 +1,153 @@
+"""Vehicles on highway-env's road: the ego with the core's dynamics, and traffic that follows its lane."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from highway_env.road.lane import AbstractLane
+from highway_env.road.road import LaneIndex, Road
+from highway_env.vehicle.kinematics import Vehicle
+
+from shared_control_env.core import single
+from shared_control_env.core.records import (
+    ACCELERATION,
+    BODY_LENGTH,
+    BODY_WIDTH,
+    HEADING,
+    SPEED,
+    YAW_RATE,
+    X,
+    Y,
+)
+from shared_control_env.core.traffic import follow_lane
+
+
+class ArrayVehicle(Vehicle):
+    """A highway-env vehicle whose pose and speed live in one array that compiled functions advance.
+
+    highway-env assigns and reads ``position``, ``heading`` and ``speed``; they are views of the array. The
+    lane is looked up when somebody asks, not at every step.
+    """
+
+    _POSE: tuple[int, int, int, int]  # places of x, y, heading and speed in the array
+    _SIZE: int
+
+    def __init__(self, road: Road, position: Any, heading: float = 0.0, speed: float = 0.0) -> None:
+        self.array = np.zeros(self._SIZE)
+        super().__init__(road, position, heading, speed)
+
+    @property
+    def position(self) -> np.ndarray:
+        return self.array[self._POSE[0] : self._POSE[1] + 1]
+
+    @position.setter
+    def position(self, value: Any) -> None:
+        self.array[self._POSE[0] : self._POSE[1] + 1] = value
+
+    @property
+    def heading(self) -> float:
+        return float(self.array[self._POSE[2]])
+
+    @heading.setter
+    def heading(self, value: float) -> None:
+        self.array[self._POSE[2]] = value
+
+    @property
+    def speed(self) -> float:
+        return float(self.array[self._POSE[3]])
+
+    @speed.setter
+    def speed(self, value: float) -> None:
+        self.array[self._POSE[3]] = value
+
+    @property
+    def lane_index(self) -> LaneIndex:
+        return self.road.network.get_closest_lane_index(self.position, self.heading)
+
+    @lane_index.setter
+    def lane_index(self, value: LaneIndex) -> None:
+        """Nothing: the lane follows from the position."""
+
+    @property
+    def lane(self) -> AbstractLane:
+        return self.road.network.get_lane(self.lane_index)
+
+    @lane.setter
+    def lane(self, value: AbstractLane) -> None:
+        """Nothing: the lane follows from the position."""
+
+
+class EgoVehicle(ArrayVehicle):
+    """The ego: ``array`` is the state [x, y, psi, v_x, v_y, r] of the dynamic bicycle (Eq. 11).
+
+    Attributes:
+        target_speed: what highway-env's MOBIL expects of every vehicle [m/s].
+        parameters: record of :class:`Parameters`.
+    """
+
+    _POSE = (0, 1, 2, 3)
+    _SIZE = 6
+
+    def __init__(
+        self,
+        road: Road,
+        position: Any,
+        heading: float,
+        speed: float,
+        yaw_rate: float,
+        target_speed: float,
+        parameters: np.ndarray,
+    ) -> None:
+        self.parameters = parameters
+        self.LENGTH, self.WIDTH = (float(parameters["vehicle"][name]) for name in ("length", "width"))
+        super().__init__(road, position, heading, speed)
+        self.array[5] = yaw_rate
+        self.target_speed = target_speed
+        self._work = np.zeros((2, 6))
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity of the centre of mass in the Cartesian frame, slip included [m/s]."""
+        _, _, psi, v_x, v_y, _ = self.array
+        return np.array([v_x * np.cos(psi) - v_y * np.sin(psi), v_x * np.sin(psi) + v_y * np.cos(psi)])
+
+    def step(self, dt: float) -> None:
+        """Advance the dynamics by dt [s] under the stored action."""
+        action = self.action
+        single.drive(self.array, action["acceleration"], action["steering"], dt, self.parameters, self._work)
+
+
+class LaneFollower(ArrayVehicle):
+    """Traffic of the paper's cases: constant speed along its lane. ``array`` is its row of the traffic array."""
+
+    _POSE = (X, Y, HEADING, SPEED)
+    _SIZE = 8
+
+    def __init__(self, road: Road, position: Any, heading: float = 0.0, speed: float = 0.0) -> None:
+        super().__init__(road, position, heading, speed)
+        self.array[BODY_LENGTH], self.array[BODY_WIDTH] = self.LENGTH, self.WIDTH
+        self.step(0.0)
+
+    def act(self, action: dict | str | None = None) -> None:
+        """Nothing to decide."""
+
+    def step(self, dt: float) -> None:
+        """Advance along the lane by dt [s]."""
+        follow_lane(self.array, self.road.line, dt)
+
+
+def write_row(vehicle: Vehicle, row: np.ndarray) -> None:
+    """Write any highway-env vehicle as a row of the traffic array, shape (8,).
+
+    Acceleration and yaw rate of a kinematic vehicle are those of its present action.
+    """
+    if isinstance(vehicle, LaneFollower):
+        row[:] = vehicle.array
+        return
+    row[X], row[Y] = vehicle.position
+    row[HEADING], row[SPEED] = vehicle.heading, vehicle.speed
+    row[ACCELERATION] = vehicle.action["acceleration"]
+    slip = np.arctan(0.5 * np.tan(vehicle.action["steering"]))
+    row[YAW_RATE] = vehicle.speed * np.sin(slip) / (0.5 * vehicle.LENGTH)
+    row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.LENGTH, vehicle.WIDTH

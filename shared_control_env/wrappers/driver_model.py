@@ -1,0 +1,74 @@
+"""A driver in the loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.utils import RecordConstructorArgs
+
+from shared_control_env.controllers.driver import Driver, PredictiveDriver
+from shared_control_env.envs.action import DRIVER
+from shared_control_env.envs.config import parameters_of
+from shared_control_env.wrappers.slots import SlotWrapper
+
+
+class DriverModel(SlotWrapper, RecordConstructorArgs):
+    """Binds the driver's command with any :class:`Driver`.
+
+    What remains is alpha_a: the task that a learned allocator solves; nothing, with the limiter applied too.
+    A driver that reports a ``solution`` has its status, iterations, residuals and failures in ``info["driver"]``.
+
+    Args:
+        env: an environment whose driver is open.
+        driver: the driver; by default the paper's predictive driver with the environment's parameters.
+
+    Raises:
+        ValueError: if the driver lacks ``reset`` or ``act``.
+    """
+
+    def __init__(self, env: gym.Env, driver: Driver | None = None) -> None:
+        RecordConstructorArgs.__init__(self, driver=driver)
+        SlotWrapper.__init__(self, env, DRIVER)
+        if driver is not None and not isinstance(driver, Driver):
+            raise ValueError(
+                f"driver = {driver!r} must have reset(seed) and act(observation, scene) -> [a, delta]"
+            )
+        self._given = driver
+        self.driver: Driver = driver or PredictiveDriver(parameters_of(self.shared.settings))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Reset environment and driver; the driver's seed is drawn from the environment's generator."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        if self._given is None and options and "config" in options:
+            self.driver = PredictiveDriver(parameters_of(self.shared.settings))
+        self.driver.reset(seed=int(self.shared.np_random.integers(2**31)))
+        return observation, {**info, **self._report()}
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Step with the driver's command; see :class:`SharedControlEnv`."""
+        observation, reward, terminated, truncated, info = self.env.step(self.action(action))
+        return observation, reward, terminated, truncated, {**info, **self._report()}
+
+    def decide(self) -> np.ndarray:
+        """The driver's command over its limits, shape (2,)."""
+        command = self.driver.act(self.shared.observation, self.shared.scene)
+        return np.asarray(command, dtype=float) / self.shared.command_limits
+
+    def _report(self) -> dict[str, Any]:
+        """The solver's report, with one form from the reset on."""
+        if not hasattr(self.driver, "solution"):
+            return {}
+        solution = self.driver.solution
+        return {
+            "driver": {
+                "status": 0 if solution is None else solution.status,
+                "iterations": 0 if solution is None else solution.iterations,
+                "primal_residual": 0.0 if solution is None else solution.primal_residual,
+                "dual_residual": 0.0 if solution is None else solution.dual_residual,
+                "failures": int(getattr(self.driver, "failures", 0)),
+            }
+        }

@@ -57,9 +57,12 @@ class Limits(NamedTuple):
 class PredictiveParameters(NamedTuple):
     """Horizon and weights of both predictive controllers (Eq. 13, 15).
 
-    The paper prints the horizons but no weights. These were chosen so that the healthy automation
-    settles a 1 m lane error in about 2 s without overshoot and tracks a 3 m/s speed step in about
-    3 s; the same values serve the driver, as the paper says.
+    The paper prints the horizons but no weights. With these the healthy automation brings a lane error of 1 m
+    under 5 cm in 1.75 s with an overshoot of 0.23 m, and in Case 1 the degraded automation alone leaves
+    the lane (2.4 m) while the driver holds it (0.6 m). The same values serve the driver, as the paper says.
+    The driver's loop has little to spare: a horizon of 0.5 s gives about as much lead as the lag of
+    Eq. 16 takes away, so that without the automation (law ``driver_only``) it oscillates from a lane error of 1 m
+    at all of some twenty weightings tried.
 
     Attributes:
         H_p: prediction horizon [steps]; paper, Section VI.

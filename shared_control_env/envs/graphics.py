@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pygame
 from highway_env.envs.common.graphics import EnvViewer
-from highway_env.road.graphics import RoadGraphics
+from highway_env.road.graphics import RoadGraphics, WorldSurface
 
 from shared_control_env.core.road import point_at
 from shared_control_env.core.safe_area import REACHED
@@ -33,14 +33,23 @@ class SharedControlViewer(EnvViewer):
     """
 
     def __init__(self, env: SharedControlEnv) -> None:
-        config = env.config
-        width, height = config["screen_width"], config["screen_height"]
-        super().__init__(env, {**config, "screen_height": height - PANEL_HEIGHT, "offscreen_rendering": True})
-        self.offscreen = config["offscreen_rendering"]
-        self.frame_surface = pygame.Surface((width, height))
+        # The parent's constructor opens a display even where it only draws on surfaces, so it is not called.
+        self.env, self.config = env, env.config
+        self.offscreen = self.config["offscreen_rendering"]
+        self.observer_vehicle = None
+        size = (self.config["screen_width"], self.config["screen_height"])
         if not self.offscreen:
-            self.screen = pygame.display.set_mode((width, height))
+            pygame.display.init()
+            pygame.display.set_caption("shared_control_env")
+            self.screen = pygame.display.set_mode(size)
+        pygame.font.init()
         self.font = pygame.font.Font(None, 20)
+        self.clock = pygame.time.Clock()
+        self.frame_surface = pygame.Surface(size)
+        world = (size[0], size[1] - PANEL_HEIGHT)
+        self.sim_surface = WorldSurface(world, 0, pygame.Surface(world))
+        self.sim_surface.scaling = self.config["scaling"]
+        self.sim_surface.centering_position = list(self.config["centering_position"])
 
     def display(self) -> None:
         """Draw the present scene on the frame and, in human mode, on the window."""
@@ -117,7 +126,8 @@ class SharedControlViewer(EnvViewer):
         for channel, (title, unit, bound, shown) in enumerate(
             (
                 ("acceleration", "m/s2", float(limits["a_max"]), 1.0),
-                ("steering", "deg", float(limits["delta_max"]), 180.0 / np.pi),
+                # A bar to the left is steering to the left, which is positive.
+                ("steering", "deg", -float(limits["delta_max"]), 180.0 / np.pi),
             )
         ):
             left = (0.37 + 0.32 * channel) * width
@@ -141,7 +151,7 @@ class SharedControlViewer(EnvViewer):
         colour: tuple[int, int, int],
         centred: bool,
     ) -> None:
-        """A labelled bar of a value in [0, 1], or in [-1, 1] about its middle (left of it positive)."""
+        """A labelled bar of a value in [0, 1], or in [-1, 1] about its middle."""
         x, y = corner
         self._write(label if centred else f"{label} = {value:.2f}", (x, y))
         pygame.draw.rect(self.frame_surface, FAINT, (x, y + 17, width, 9))

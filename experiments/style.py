@@ -1,0 +1,42 @@
+"""Look of the figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
+
+DESIRED, DEGRADED, ACTUAL, DRIVER, TOTAL = "#d62728", "#17becf", "#1f77b4", "#2ca02c", "#000000"
+LAW_COLOURS = {
+    "paper": "#1f77b4",
+    "proportional": "#9467bd",
+    "none": "#ff7f0e",
+    "driver_only": "#2ca02c",
+    "automation_alone": "#7f7f7f",
+}
+SAFE_AREA, PREDICTION = "#8fd19e", "#00c81e"
+
+
+@contextmanager
+def figure(path: Path, rows: int, columns: int, size: tuple[float, float]) -> Iterator[tuple]:
+    """A figure with its axes, written to the path at the end."""
+    with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False}):
+        fig, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
+        try:
+            yield fig, axes
+            path.parent.mkdir(parents=True, exist_ok=True)
+            # No creation date: the same run writes the same bytes.
+            fig.savefig(path, dpi=150, metadata={"Software": None})
+        finally:
+            plt.close(fig)
+
+
+def mark_fault(axis: plt.Axes, onset: float) -> None:
+    """A dotted line at the onset of the degradation."""
+    axis.axvline(onset, color="0.4", ls=":", lw=1)

@@ -1,0 +1,169 @@
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shared_control_env.core import safe_area as sa
+from shared_control_env.core.lateral_risk import boundary_field, continuous_field, lateral_risk
+from shared_control_env.core.parameters import LateralRiskParameters
+from shared_control_env.core.records import SAFE_AREA
+
+REGION = np.array([0.0, 40.0, -2.0, 6.0])
+FIELD = LateralRiskParameters()
+
+
+def find(holes, region=REGION, d=0.0, width=2.0):
+    area = np.zeros(1, SAFE_AREA)[0]
+    sa.find_safe_area(np.asarray(region, dtype=float), d, np.asarray(holes, dtype=float).reshape(-1, 4, 2), width, area)
+    return area
+
+
+def rectangle(s, d, length=5.0, width=2.0, psi=0.0):
+    c, n = np.cos(psi), np.sin(psi)
+    corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [length / 2, width / 2]
+    return corners @ np.array([[c, n], [-n, c]]) + [s, d]
+
+
+def polygon(area):
+    return shapely.Polygon(np.vstack([area["lower"], area["upper"][::-1]])).buffer(0)
+
+
+vehicles = st.lists(
+    st.builds(
+        rectangle,
+        st.floats(-3.0, 45.0),
+        st.floats(-4.0, 8.0),
+        st.floats(4.0, 12.0),
+        st.floats(1.6, 2.6),
+        st.floats(-0.3, 0.3),
+    ),
+    max_size=6,
+)
+
+
+@given(vehicles)
+@settings(max_examples=150)
+def test_triangles_partition_the_free_region_and_are_delaunay(holes):
+    triangles = sa.triangulate(*REGION, np.array(holes).reshape(-1, 4, 2))
+    free = shapely.box(0.0, -2.0, 40.0, 6.0).difference(shapely.union_all([shapely.Polygon(h) for h in holes]))
+    shapes = [shapely.Polygon(t) for t in triangles]
+    assert sum(s.area for s in shapes) == pytest.approx(free.area, abs=1e-6)
+    if shapes:
+        assert shapely.union_all(shapes).symmetric_difference(free).area < 1e-6
+    sa.orient(triangles)
+    neighbours = sa.adjacency(triangles)
+    for i in range(len(triangles)):
+        for edge in range(3):
+            j = neighbours[i, edge]
+            if j >= 0:
+                shared = {tuple(triangles[i, edge]), tuple(triangles[i, (edge + 1) % 3])}
+                (apex,) = (p for p in map(tuple, triangles[j]) if p not in shared)
+                assert in_circle(triangles[i], np.array(apex)) <= 1e-6
+
+
+def in_circle(triangle, point):
+    """Positive inside the circumcircle of a counter-clockwise triangle, scaled to its size."""
+    rows = triangle - point
+    determinant = np.linalg.det(np.c_[rows, (rows**2).sum(axis=1)])
+    return determinant / max(1.0, np.abs(rows).max()) ** 4
+
+
+@given(vehicles, st.floats(-1.9, 5.9))
+@settings(max_examples=150)
+def test_safe_area_lies_in_the_free_region(holes, d):
+    area = find(holes, d=d)
+    free = shapely.box(0.0, -2.0, 40.0, 6.0).difference(shapely.union_all([shapely.Polygon(h) for h in holes]))
+    assert polygon(area).difference(free.buffer(1e-6)).area < 1e-6
+    assert np.isfinite(area["lower"]).all()
+    assert np.isfinite(area["upper"]).all()
+    if area["outcome"] == sa.REACHED:
+        assert area["lower"][-1, 0] == pytest.approx(40.0)
+        assert area["upper"][-1, 0] == pytest.approx(40.0)
+
+
+@given(vehicles, st.floats(0.5, 39.5), st.floats(-2.5, 6.5))
+@settings(max_examples=200)
+def test_boundary_distance_equals_shapelys(holes, s, d):
+    area = find(holes)
+    if area["outcome"] != sa.REACHED:
+        return
+    r_b, _, _ = sa.boundary_distance(area, s, d)
+    point = shapely.Point(s, d)
+    shape = polygon(area)
+    chains = [shapely.LineString(area[side]) for side in ("lower", "upper")]
+    expected = min(point.distance(chain) for chain in chains) if shape.contains(point) else 0.0
+    assert r_b == pytest.approx(expected, abs=1e-9)
+
+
+def test_empty_lane_is_the_lane():
+    area = find([], region=[10.0, 50.0, -2.0, 2.0])
+    np.testing.assert_array_equal(np.unique(area["lower"], axis=0), [[10.0, -2.0], [50.0, -2.0]])
+    np.testing.assert_array_equal(np.unique(area["upper"], axis=0), [[10.0, 2.0], [50.0, 2.0]])
+    assert area["outcome"] == sa.REACHED
+    assert sa.lateral_bounds(area, 30.0) == (-2.0, 2.0)
+    assert sa.boundary_distance(area, 20.0, 0.5) == pytest.approx((1.5, 0.0, -1.0))
+
+
+def test_front_end_is_open_but_a_blocked_end_is_not():
+    area = find([], region=[0.0, 20.0, -2.0, 2.0])
+    assert sa.boundary_distance(area, 60.0, 0.0)[0] == pytest.approx(2.0)
+    blocked = find([rectangle(12.5, 0.0, width=6.0)], region=[0.0, 20.0, -2.0, 2.0])
+    assert blocked["outcome"] == sa.BLOCKED
+    assert blocked["end"] == pytest.approx(10.0)
+    assert lateral_risk(blocked, 5.0, 0.0, FIELD) == 0.0
+    assert lateral_risk(blocked, 16.0, 0.0, FIELD) == 1.0
+
+
+def test_a_gap_narrower_than_the_vehicle_is_no_passage():
+    region = [0.0, 40.0, -2.0, 2.0]
+    assert find([rectangle(20.0, 1.2)], region)["outcome"] == sa.REACHED  # leaves 2.2 m
+    assert find([rectangle(20.0, 0.8)], region)["outcome"] == sa.BLOCKED  # leaves 1.8 m
+    assert find([rectangle(20.0, 0.0)], region)["outcome"] == sa.BLOCKED  # 1 m on both sides
+
+
+def test_passes_a_vehicle_on_the_free_side():
+    area = find([rectangle(20.0, 0.0)])
+    assert area["outcome"] == sa.REACHED
+    low, high = sa.lateral_bounds(area, 20.0)
+    assert (low, high) == pytest.approx((1.0, 6.0))
+
+
+def test_a_covered_start_is_blocked():
+    area = find([rectangle(0.0, 2.0, length=20.0, width=12.0)])
+    assert area["outcome"] == sa.BLOCKED
+    assert lateral_risk(area, 5.0, 0.0, FIELD) == 1.0
+
+
+def test_mirror():
+    holes = np.array([rectangle(15.0, 1.4, psi=0.1), rectangle(30.0, -1.5, psi=-0.05)])
+    region = [0.0, 40.0, -2.0, 2.0]
+    area, mirrored = find(holes, region, d=0.3), find(holes * [1.0, -1.0], region, d=-0.3)
+    np.testing.assert_allclose(mirrored["upper"], area["lower"] * [1.0, -1.0], atol=1e-12)
+    np.testing.assert_allclose(mirrored["lower"], area["upper"] * [1.0, -1.0], atol=1e-12)
+
+
+def test_gradient_of_the_distance():
+    area = find([rectangle(20.0, 0.0, psi=0.2)])
+    rng = np.random.default_rng(0)
+    checked = 0
+    for s, d in zip(rng.uniform(1, 39, 300), rng.uniform(-2, 6, 300), strict=True):
+        r_b, gs, gd = sa.boundary_distance(area, s, d)
+        if r_b > 0.01:
+            h = 1e-6
+            numeric = [
+                (sa.boundary_distance(area, s + h, d)[0] - sa.boundary_distance(area, s - h, d)[0]) / (2 * h),
+                (sa.boundary_distance(area, s, d + h)[0] - sa.boundary_distance(area, s, d - h)[0]) / (2 * h),
+            ]
+            checked += np.allclose([gs, gd], numeric, atol=1e-4)
+    assert checked > 150  # all but those beside a ridge, where two boundaries are equally near
+
+
+def test_field_as_printed_and_continuous():
+    cut = FIELD.d_c + 0.5 * FIELD.v_w
+    assert boundary_field(cut + 1e-9, FIELD) == 0.0
+    assert boundary_field(cut, FIELD) / FIELD.alpha_f == pytest.approx(0.039, abs=5e-4)
+    assert boundary_field(0.0, FIELD) == FIELD.alpha_f
+    assert continuous_field(cut, FIELD)[0] == pytest.approx(0.0, abs=1e-12)
+    value, slope = continuous_field(0.7, FIELD)
+    assert slope == pytest.approx((continuous_field(0.7 + 1e-6, FIELD)[0] - value) / 1e-6, rel=1e-4)

@@ -56,15 +56,15 @@ def prepare(out: Path, fresh: bool) -> None:
         typer.BadParameter: if it holds something else.
     """
     stamp = out / STAMP
-    if out.exists() and any(out.iterdir()) and not fresh:
+    if out.exists() and any(out.iterdir()):
         if not stamp.is_file():
             raise typer.BadParameter(f"{out} holds files that are no results of this command; choose another --out")
-        if stamp.read_text().strip() != fingerprint():
+        if fresh:
+            shutil.rmtree(out)
+        elif stamp.read_text().strip() != fingerprint():
             raise typer.BadParameter(
                 f"{out} holds results of other sources or versions; pass --fresh to replace them, or another --out"
             )
-    elif fresh and stamp.is_file():
-        shutil.rmtree(out)
     out.mkdir(parents=True, exist_ok=True)
     stamp.write_text(fingerprint() + "\n")
 

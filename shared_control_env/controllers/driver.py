@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from time import perf_counter
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import osqp
@@ -84,6 +84,10 @@ class PredictiveDriver:
         self.solution: Solution | None = None
         self._last = np.zeros(2)
         self._solver: osqp.OSQP | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State for copies; OSQP's workspace cannot be copied, so a copy sets up its own, from a cold start."""
+        return {**self.__dict__, "_solver": None}
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired command u_h,des; see :class:`Driver`."""

@@ -28,12 +28,17 @@ class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-def _section(parameters: type, *left_out: str, **more: Any) -> Any:
-    """Settings with the fields, types, ranges, defaults and documentation of a named-tuple class."""
+def _section(name: str, parameters: type, *left_out: str, **more: Any) -> Any:
+    """Settings with the fields, types, ranges, defaults and documentation of a named-tuple class.
+
+    The class goes by the name that it is assigned to here, so that it can be pickled.
+    """
     hints = get_type_hints(parameters, include_extras=True)
     defaults = parameters._field_defaults  # type: ignore[attr-defined]
-    fields = {name: (hints[name], defaults[name]) for name in defaults if name not in left_out}
-    return create_model(parameters.__name__, __base__=_Section, __doc__=parameters.__doc__, **fields, **more)
+    fields = {field: (hints[field], defaults[field]) for field in defaults if field not in left_out}
+    return create_model(
+        name, __base__=_Section, __module__=__name__, __doc__=parameters.__doc__, **fields, **more
+    )
 
 
 class Segment(_Section):
@@ -92,17 +97,17 @@ class SolverSettings(_Section):
 
 _TASK_FROM_ROAD = ("dt", "lane_width", "road_low", "road_high", "y_target")
 _Longitudinal = _section(
-    core.LongitudinalRiskParameters, "graded", preset=(Literal["paper", "graded"], "graded")
+    "_Longitudinal", core.LongitudinalRiskParameters, "graded", preset=(Literal["paper", "graded"], "graded")
 )
-_Task = _section(core.TaskParameters, *_TASK_FROM_ROAD)
-_Vehicle = _section(core.VehicleParameters)
-_Limits = _section(core.Limits)
-_Predictive = _section(core.PredictiveParameters)
-_SafeArea = _section(core.SafeAreaParameters)
-_Lateral = _section(core.LateralRiskParameters)
-_Law = _section(core.LawParameters)
-_Lag = _section(core.DriverLagParameters)
-_Reward = _section(core.RewardParameters)
+_Task = _section("_Task", core.TaskParameters, *_TASK_FROM_ROAD)
+_Vehicle = _section("_Vehicle", core.VehicleParameters)
+_Limits = _section("_Limits", core.Limits)
+_Predictive = _section("_Predictive", core.PredictiveParameters)
+_SafeArea = _section("_SafeArea", core.SafeAreaParameters)
+_Lateral = _section("_Lateral", core.LateralRiskParameters)
+_Law = _section("_Law", core.LawParameters)
+_Lag = _section("_Lag", core.DriverLagParameters)
+_Reward = _section("_Reward", core.RewardParameters)
 
 
 class Settings(_Section):

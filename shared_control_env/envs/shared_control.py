@@ -50,7 +50,6 @@ class SharedControlEnv(AbstractEnv):
         command_limits: largest acceleration and steering [m/s^2, rad], shape (2,).
         automation: any object with ``reset()`` and ``act(scene) -> Solution``.
         observation: the last observation.
-        path: Cartesian positions of the ego so far, shape (k + 1, 2) [m].
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
@@ -150,7 +149,7 @@ class SharedControlEnv(AbstractEnv):
             neighbour_vehicles_connected_lanes=settings.neighbour_vehicles_connected_lanes,
         )
         self._place_vehicles()
-        self.traffic = self.road.update_rows()[1:]
+        self.road.update_rows()
         self._corners = np.zeros((len(self.traffic), 4, 2))
         self._terms = np.zeros(len(reward.TERMS))
         self._path = np.zeros((settings.steps + 1, 2))
@@ -306,6 +305,11 @@ class SharedControlEnv(AbstractEnv):
             "lane_departures": int(self._lane_departures),
             "rewards": dict(zip(reward.TERMS, self._terms.tolist(), strict=True)),
         }
+
+    @property
+    def traffic(self) -> np.ndarray:
+        """The other vehicles as rows of :mod:`records`' traffic columns, shape (n, 8)."""
+        return self.road.rows[1:]
 
     @property
     def path(self) -> np.ndarray:

@@ -55,8 +55,10 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
 
     def decide(self) -> np.ndarray:
         """The driver's command over its limits, shape (2,)."""
-        command = self.driver.act(self.shared.observation, self.shared.scene)
-        return np.asarray(command, dtype=float) / self.shared.command_limits
+        command = np.asarray(self.driver.act(self.shared.observation, self.shared.scene), dtype=float)
+        if command.shape != (2,):
+            raise ValueError(f"driver.act() gave {command!r}; it must give [a, delta] [m/s^2, rad], shape (2,)")
+        return command / self.shared.command_limits
 
     def _report(self) -> dict[str, Any]:
         """The solver's report, with one form from the reset on."""

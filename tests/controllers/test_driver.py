@@ -1,3 +1,5 @@
+import copy
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -88,6 +90,14 @@ def test_episodes_do_not_depend_on_those_before():
     first = [driver.act(np.zeros(25), scene) for scene in scenes]
     driver.reset()
     np.testing.assert_array_equal(first, [driver.act(np.zeros(25), scene) for scene in scenes])
+
+
+def test_copies_set_up_their_own_workspace():
+    driver = PredictiveDriver()
+    scene = scene_of(np.array([0.0, 0.5, 0.0, 15.0, 0.0, 0.0]), PARAMETERS)
+    driver.act(np.zeros(25), scene)
+    twin = copy.deepcopy(driver)
+    np.testing.assert_allclose(twin.act(np.zeros(25), scene), driver.act(np.zeros(25), scene), atol=1e-3)
 
 
 def test_protocol():

@@ -1,0 +1,69 @@
+"""A solver that fails or a blocked corridor never ends the episode."""
+
+import numpy as np
+
+from shared_control_env.core import automation_mpc
+from shared_control_env.core.lateral_risk import lateral_risk
+from shared_control_env.core.parameters import LateralRiskParameters
+from shared_control_env.core.safe_area import BLOCKED
+from shared_control_env.envs import TwoLaneEnv
+from shared_control_env.wrappers import AuthorityLimiter, DriverModel
+
+
+def test_a_failing_automation_holds_its_last_command_and_is_counted():
+    env = DriverModel(AuthorityLimiter(TwoLaneEnv({"faults": [], "duration": 2.0})))
+    env.reset(seed=0)
+    env.step(0)
+    bare = env.unwrapped
+    act = bare.automation.act
+
+    def fail(scene):
+        z = scene["z"].copy()
+        scene["z"][1] = np.nan
+        solution = act(scene)
+        scene["z"] = z
+        return solution
+
+    bare.automation.act = fail
+    _, _, _, _, before = env.step(0)
+    for count in range(1, 11):
+        _, _, terminated, truncated, info = env.step(0)
+        assert not terminated
+        assert not truncated
+        assert info["automation"]["status"] == automation_mpc.FAILED
+        assert info["automation"]["failures"] >= count
+        np.testing.assert_array_equal(info["u_a_des"], before["u_a_des"])
+    bare.automation.act = act
+    env.step(0)
+    assert env.step(0)[4]["automation"]["status"] != automation_mpc.FAILED
+
+
+def test_a_blocked_corridor_is_reported_and_driven_on():
+    # A wide load beside the lane reaches into it, its centre in the other lane.
+    env = DriverModel(AuthorityLimiter(TwoLaneEnv({"faults": [], "vehicles": [], "duration": 2.0})))
+    env.reset(seed=0)
+    bare = env.unwrapped
+    load = bare._vehicle_class(bare.road, (40.0, 2.5), heading=0.0, speed=0.0)
+    load.array[7] = 5.4
+    bare.road.vehicles.append(load)
+    bare.road.update_rows()
+    bare._corners = np.zeros((1, 4, 2))
+    outcomes = []
+    for _ in range(30):
+        _, _, terminated, _, info = env.step(0)
+        outcomes.append(info["safe_area_outcome"])
+        assert not terminated
+        assert np.isfinite(info["u"]).all()
+    assert outcomes[-1] == BLOCKED
+    assert lateral_risk(bare.scene["area"][()], 35.0, 0.0, LateralRiskParameters()) < 0.05
+    assert lateral_risk(bare.scene["area"][()], 50.0, 0.0, LateralRiskParameters()) == 1.0
+
+
+def test_out_of_the_lane_the_driver_comes_back():
+    env = DriverModel(AuthorityLimiter(TwoLaneEnv({"faults": [], "vehicles": [], "duration": 4.0})))
+    env.reset(seed=0)
+    env.unwrapped.vehicle.array[1] = 2.6
+    for _ in range(80):
+        _, _, terminated, _, info = env.step(0)
+        assert not terminated
+    assert abs(info["z"][1]) < 0.5

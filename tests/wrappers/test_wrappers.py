@@ -1,0 +1,111 @@
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+import shared_control_env  # noqa: F401
+from shared_control_env.core.fuzzy import authority
+from shared_control_env.envs import TwoLaneEnv
+from shared_control_env.wrappers import AuthorityLimiter, DriverModel, open_slots
+
+
+class Steady:
+    """A driver that holds one command and counts its calls."""
+
+    def __init__(self, command=(0.5, 0.02)):
+        self.command, self.seeds, self.observations = np.array(command), [], []
+
+    def reset(self, seed=None):
+        self.seeds.append(seed)
+
+    def act(self, observation, scene):
+        self.observations.append(observation)
+        return self.command
+
+
+def test_slots_of_every_combination():
+    bare = TwoLaneEnv()
+    assert set(bare.action_space) == {"driver", "authority"}
+    limited, driven = AuthorityLimiter(TwoLaneEnv()), DriverModel(TwoLaneEnv())
+    both = DriverModel(AuthorityLimiter(TwoLaneEnv()))
+    assert open_slots(limited) == ("driver",)
+    assert open_slots(driven) == ("authority",)
+    assert open_slots(both) == ()
+    assert limited.action_space == spaces.Box(-1.0, 1.0, (2,), np.float32)
+    assert driven.action_space == spaces.Box(0.0, 1.0, (1,), np.float32)
+    assert both.action_space == spaces.Discrete(1)
+
+
+def test_order_of_the_wrappers_does_not_matter():
+    one = DriverModel(AuthorityLimiter(TwoLaneEnv()))
+    other = AuthorityLimiter(DriverModel(TwoLaneEnv()))
+    for env in (one, other):
+        env.reset(seed=0)
+    for _ in range(50):
+        a, b = one.step(0), other.step(0)
+        np.testing.assert_array_equal(a[0], b[0])
+        assert a[1] == b[1]
+        np.testing.assert_array_equal(a[4]["u"], b[4]["u"])
+
+
+def test_limiter_is_the_fuzzy_inference_of_the_assessed_risk():
+    env = DriverModel(gym.make("SharedControl/TwoLane-v0"))
+    env.reset(seed=0)
+    values = []
+    for _ in range(60):
+        info = env.step(0)[4]
+        assert info["alpha_a"] == authority(info["r_x"], info["r_y"], 0)
+        values.append(info["alpha_a"])
+    assert max(values) == pytest.approx(1.0)
+    assert min(values) < 0.4
+
+
+def test_allocators_action_is_alpha():
+    env = DriverModel(TwoLaneEnv({"authority": {"law": "proportional"}}))
+    env.reset(seed=0)
+    info = env.step(np.array([0.25], dtype=np.float32))[4]
+    assert info["alpha_a"] == 0.25
+    np.testing.assert_allclose(info["u_a_act"], 0.25 * info["u_a_f"])
+
+
+def test_any_driver_plugs_in():
+    driver = Steady()
+    env = DriverModel(gym.make("SharedControl/TwoLane-v0"), driver)
+    observation, _ = env.reset(seed=0)
+    _, _, _, _, info = env.step(0)
+    np.testing.assert_allclose(info["u_h_des"], driver.command)
+    np.testing.assert_array_equal(driver.observations[0], observation)
+    assert "driver" not in info
+
+
+def test_drivers_seed_comes_from_the_environments_generator():
+    seeds = []
+    for seed in (1, 1, 2):
+        driver = Steady()
+        DriverModel(gym.make("SharedControl/TwoLane-v0"), driver).reset(seed=seed)
+        seeds.append(driver.seeds[-1])
+    assert seeds[0] == seeds[1] != seeds[2]
+
+
+@pytest.mark.parametrize(
+    ("build", "message"),
+    [
+        (lambda: AuthorityLimiter(AuthorityLimiter(TwoLaneEnv())), "bound already"),
+        (lambda: DriverModel(DriverModel(TwoLaneEnv())), "bound already"),
+        (lambda: DriverModel(TwoLaneEnv(), driver=object()), "must have reset"),
+        (lambda: AuthorityLimiter(gym.make("CartPole-v1")), "SharedControlEnv"),
+    ],
+)
+def test_refused(build, message):
+    with pytest.raises(ValueError, match=message):
+        build()
+
+
+@pytest.mark.parametrize("command", [(np.nan, 0.0), (0.0, 0.0, 0.0)])
+def test_a_drivers_malformed_command_moves_nothing(command):
+    env = DriverModel(gym.make("SharedControl/TwoLane-v0"), Steady(command))
+    env.reset(seed=0)
+    state = env.unwrapped.vehicle.array.copy()
+    with pytest.raises(ValueError, match="driver"):
+        env.step(0)
+    np.testing.assert_array_equal(env.unwrapped.vehicle.array, state)

@@ -33,7 +33,18 @@ SIGNAL_COLUMNS = {
 }
 """Columns made of the array-valued signals of ``info``."""
 
-SCALAR_COLUMNS = ("k", "t", "y_target", "v_target", "r_x", "r_y", "alpha_a", "speed", "lane_departures", "safe_area_outcome")
+SCALAR_COLUMNS = (
+    "k",
+    "t",
+    "y_target",
+    "v_target",
+    "r_x",
+    "r_y",
+    "alpha_a",
+    "speed",
+    "lane_departures",
+    "safe_area_outcome",
+)
 
 
 @dataclass(frozen=True)

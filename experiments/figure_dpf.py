@@ -32,9 +32,7 @@ def draw(path: Path) -> None:
                     for dv in speeds
                 ]
             )
-            risk = np.array(
-                [[pair_risk(V_OBSTACLE + dv, V_OBSTACLE, dx, p) for dx in distances] for dv in speeds]
-            )
+            risk = np.array([[pair_risk(V_OBSTACLE + dv, V_OBSTACLE, dx, p) for dx in distances] for dv in speeds])
             for axis, values, name in ((row[0], field, "field $U^d$"), (row[1], risk, "risk of the pair")):
                 mesh = axis.pcolormesh(distances, speeds, values, shading="auto", cmap="magma_r")
                 fig.colorbar(mesh, ax=axis)

@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from experiments import style
-from experiments.case_runs import make
-from experiments.case_runs import Run
+from experiments.case_runs import Run, make
 from shared_control_env.core.road import point_at
 
 EVERY = 25
@@ -31,7 +30,7 @@ def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
     table = runs[main]
     size = (11.0, 4.6) if case == 1 else (11.0, 5.6)
     shape = (2, 1) if case == 1 else (1, 2)
-    with style.figure(path, *shape, size) as (fig, axes):
+    with style.figure(path, *shape, size) as (_, axes):
         first, second = axes.ravel()
         _draw_road(first, line, table["s"].max() + 30.0)
         for k in range(0, len(table), EVERY):
@@ -68,7 +67,9 @@ def _draw_moment(axis: Axes, line: np.ndarray, row: pd.Series, label: bool) -> N
     outline = np.vstack([_resampled(lower), _resampled(upper)[::-1]])
     points = np.array([point_at(line, s, d)[:2] for s, d in outline])
     axis.add_patch(
-        Polygon(points, facecolor=style.SAFE_AREA, edgecolor="#3a9d5d", alpha=0.25, label="safe area C" if label else None)
+        Polygon(
+            points, facecolor=style.SAFE_AREA, edgecolor="#3a9d5d", alpha=0.25, label="safe area C" if label else None
+        )
     )
     axis.plot(
         row["x_pred"],

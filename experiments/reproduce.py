@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import shutil
 from collections.abc import Callable
+from functools import partial
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -87,7 +88,7 @@ def figures(runs: dict[Run, pd.DataFrame], out: Path) -> dict[Path, Callable[[Pa
     }
     for case in CASES:
         for name, module in (("path", figure_path), ("risk", figure_risk), ("commands", figure_commands)):
-            drawings[out / f"case{case}_{name}.png"] = lambda path, m=module, c=case: m.draw(runs, c, path)
+            drawings[out / f"case{case}_{name}.png"] = partial(module.draw, runs, case)
     return drawings
 
 
@@ -134,7 +135,7 @@ def main(
             if path.is_file():
                 progress.update(task, completed=len(runs[main_run]))
             else:
-                video.record(main_run, path, progress=lambda t=task: progress.advance(t))
+                video.record(main_run, path, progress=partial(progress.advance, task))
 
     rows = claims.judge(runs)
     (out / "claims.json").write_text(claims.as_json(rows, provenance()))
@@ -147,9 +148,7 @@ def _print_claims(console: Console, rows: list[dict[str, Any]]) -> None:
     table = Table("case", "claim", "printed risk", "graded risk", "verdict", title="Claims of the paper")
     colours = {claims.HOLDS: "green", claims.HOLDS_GRADED: "yellow", claims.FAILS: "red"}
     for row in rows:
-        numbers = [
-            "-" if row[key] is None else f"{row[key]:.3g}" for key in ("value_paper_risk", "value_graded_risk")
-        ]
+        numbers = ["-" if row[key] is None else f"{row[key]:.3g}" for key in ("value_paper_risk", "value_graded_risk")]
         case = "-" if row["case"] == 0 else str(row["case"])
         table.add_row(case, row["claim"], *numbers, f"[{colours[row['verdict']]}]{row['verdict']}[/]")
     console.print(table)

@@ -10,7 +10,7 @@ import matplotlib as mpl
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt  # noqa: E402  (the backend is chosen first)
+import matplotlib.pyplot as plt
 
 DESIRED, DEGRADED, ACTUAL, DRIVER, TOTAL = "#d62728", "#17becf", "#1f77b4", "#2ca02c", "#000000"
 LAW_COLOURS = {

@@ -17,9 +17,6 @@ class Automation:
 
     Args:
         parameters: :func:`records.pack` of :class:`Parameters`.
-
-    Attributes:
-        failures: steps since the reset at which the solver failed and the last command was held.
     """
 
     def __init__(self, parameters: np.ndarray) -> None:
@@ -29,6 +26,7 @@ class Automation:
 
     @property
     def failures(self) -> int:
+        """Steps since the reset at which the solver failed and the last command was held."""
         return int(self._memory["failures"])
 
     def reset(self) -> None:

@@ -17,6 +17,7 @@ from shared_control_env.core.records import (
     PRESENT,
     SPEED,
     YAW_RATE,
+    Record,
     X,
     Y,
 )
@@ -24,7 +25,7 @@ from shared_control_env.core.road import locate
 
 
 @jit
-def predict_ego(scene: np.ndarray, u_f: np.ndarray, line: np.ndarray, p: Parameters, signals: np.ndarray) -> None:
+def predict_ego(scene: Record, u_f: np.ndarray, line: np.ndarray, p: Parameters, signals: Record) -> None:
     """Prediction xi(k + tau_p) of the ego under the degraded command (Eq. 1).
 
     The yaw rate is that of the dynamic model after one step under u_a,f; pose and speed are the present
@@ -49,9 +50,7 @@ def predict_ego(scene: np.ndarray, u_f: np.ndarray, line: np.ndarray, p: Paramet
 
 
 @jit
-def predict_neighbours(
-    scene: np.ndarray, traffic: np.ndarray, line: np.ndarray, tau: float, predicted: np.ndarray
-) -> None:
+def predict_neighbours(scene: Record, traffic: np.ndarray, line: np.ndarray, tau: float, predicted: np.ndarray) -> None:
     """Prediction of the three neighbours by Eq. 1 under their present acceleration and yaw rate.
 
     Args:
@@ -72,7 +71,7 @@ def predict_neighbours(
 
 
 @jit
-def assess(scene: np.ndarray, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: np.ndarray) -> None:
+def assess(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: Record) -> None:
     """Both risks of letting ``signals.u_a_f`` drive the car (Eq. 1-8).
 
     Args:

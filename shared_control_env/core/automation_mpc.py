@@ -14,6 +14,7 @@ from shared_control_env.core.dynamics import V_X, R, S, Y, implicit_step, implic
 from shared_control_env.core.jit import jit
 from shared_control_env.core.lateral_risk import continuous_field
 from shared_control_env.core.parameters import Limits, Parameters
+from shared_control_env.core.records import Record
 from shared_control_env.core.safe_area import boundary_distance
 
 CONVERGED, ITERATION_LIMIT, FAILED = 0, 1, 2
@@ -27,7 +28,7 @@ _SHORTEST_STEP = 1e-3
 
 
 @jit
-def cost(U: np.ndarray, scene: np.ndarray, p: Parameters, work: np.ndarray) -> float:
+def cost(U: np.ndarray, scene: Record, p: Parameters, work: Record) -> float:
     """Cost of a command sequence, Eq. 13.
 
     ::
@@ -70,7 +71,7 @@ def cost(U: np.ndarray, scene: np.ndarray, p: Parameters, work: np.ndarray) -> f
 
 
 @jit
-def linearise(U: np.ndarray, scene: np.ndarray, p: Parameters, work: np.ndarray) -> float:
+def linearise(U: np.ndarray, scene: Record, p: Parameters, work: Record) -> float:
     """Quadratic model of half the cost about U: fills ``work.gradient`` and ``work.hessian``.
 
     Args:
@@ -89,13 +90,9 @@ def linearise(U: np.ndarray, scene: np.ndarray, p: Parameters, work: np.ndarray)
     for i in range(w.H_p):
         j = min(i, w.H_c - 1)
         n = 2 * j + 2
-        implicit_step_jacobian(
-            z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next, work.A, work.B
-        )
+        implicit_step_jacobian(z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next, work.A, work.B)
         propagate(work.A, work.B, sens, sens_next, n)
-        total += add_tracking(
-            work, w, p.task.dt, z, z_next, sens, sens_next, scene.y_target, scene.v_target, n
-        )
+        total += add_tracking(work, w, p.task.dt, z, z_next, sens, sens_next, scene.y_target, scene.v_target, n)
         r_b, r_b_s, r_b_d = boundary_distance(scene.area, z_next[S], z_next[Y])
         P, P_r = continuous_field(r_b, p.lateral)
         if P > 0.0:
@@ -130,7 +127,7 @@ def projected_gradient(U: np.ndarray, gradient: np.ndarray, H_c: int, limits: Li
 
 
 @jit
-def _search_line(U: np.ndarray, value: float, scene: np.ndarray, p: Parameters, work: np.ndarray) -> float:
+def _search_line(U: np.ndarray, value: float, scene: Record, p: Parameters, work: Record) -> float:
     """Backtrack along ``work.step`` to a sufficient decrease and move U there; return the cost, or inf."""
     n = 2 * p.automation.H_c
     slope = 0.0
@@ -150,9 +147,7 @@ def _search_line(U: np.ndarray, value: float, scene: np.ndarray, p: Parameters, 
 
 
 @jit
-def solve(
-    U: np.ndarray, scene: np.ndarray, p: Parameters, iterations: int, work: np.ndarray
-) -> tuple[int, int, float, float]:
+def solve(U: np.ndarray, scene: Record, p: Parameters, iterations: int, work: Record) -> tuple[int, int, float, float]:
     """Minimise Eq. 13 over the bounded commands, from the guess U.
 
     Args:

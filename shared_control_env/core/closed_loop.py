@@ -15,10 +15,11 @@ from shared_control_env.core.degradation import degrade
 from shared_control_env.core.driver_lag import advance_lag
 from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import Record
 
 
 @jit
-def clear_memory(memory: np.ndarray) -> None:
+def clear_memory(memory: Record) -> None:
     """State of a loop that has not run: no command, full authority on display."""
     memory.u_h_act[:] = 0.0
     memory.u_h_des[:] = 0.0
@@ -27,7 +28,7 @@ def clear_memory(memory: np.ndarray) -> None:
 
 
 @jit
-def clear_automation(memory: np.ndarray) -> None:
+def clear_automation(memory: Record) -> None:
     """State of an automation that has not run."""
     memory.U[:] = 0.0
     memory.u_a_des[:] = 0.0
@@ -35,7 +36,7 @@ def clear_automation(memory: np.ndarray) -> None:
 
 
 @jit
-def automate(scene: np.ndarray, p: Parameters, memory: np.ndarray, work: np.ndarray) -> tuple[int, int, float]:
+def automate(scene: Record, p: Parameters, memory: Record, work: Record) -> tuple[int, int, float]:
     """The automation's desired command u_a,des (Eq. 13), left in ``memory.u_a_des``.
 
     When the solver fails the last feasible command is held and the failure counted.
@@ -62,12 +63,12 @@ def automate(scene: np.ndarray, p: Parameters, memory: np.ndarray, work: np.ndar
 
 @jit
 def monitor(
-    scene: np.ndarray,
+    scene: Record,
     traffic: np.ndarray,
     line: np.ndarray,
     faults: np.ndarray,
     p: Parameters,
-    signals: np.ndarray,
+    signals: Record,
 ) -> None:
     """First half of a step, after the automation: its degradation u_a,f, the prediction xi, the risks r_y, r_x.
 
@@ -84,9 +85,7 @@ def monitor(
 
 
 @jit
-def blend(
-    u_h_des: np.ndarray, alpha_a: float, p: Parameters, memory: np.ndarray, signals: np.ndarray
-) -> None:
+def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, memory: Record, signals: Record) -> None:
     """Second half of a step: u_a,act (Eq. 10), u_h,act (Eq. 16) and ``u = clip(u_a,act + u_h,act)``.
 
     Args:

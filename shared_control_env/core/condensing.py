@@ -12,7 +12,7 @@ import numpy as np
 from shared_control_env.core.dynamics import PSI, V_X, V_Y, R, S, Y
 from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import PredictiveParameters
-from shared_control_env.core.records import MAX_CONTROL
+from shared_control_env.core.records import MAX_CONTROL, Record
 
 _N = 2 * MAX_CONTROL
 
@@ -41,7 +41,7 @@ WORKSPACE = np.dtype(
 
 
 @jit
-def clear(work: np.ndarray) -> None:
+def clear(work: Record) -> None:
     """Start a condensation: zero gradient, Hessian and sensitivities of a :data:`WORKSPACE` record."""
     work.gradient[:] = 0.0
     work.hessian[:] = 0.0
@@ -66,9 +66,7 @@ def propagate(A: np.ndarray, B: np.ndarray, sens: np.ndarray, sens_next: np.ndar
         for i in (V_X, V_Y, R):
             sens_next[i, c] = A[i, V_X] * v_x + A[i, V_Y] * v_y + A[i, R] * r
         for i in (S, Y, PSI):
-            sens_next[i, c] = (
-                A[i, Y] * y + A[i, PSI] * psi + A[i, V_X] * v_x + A[i, V_Y] * v_y + A[i, R] * r
-            )
+            sens_next[i, c] = A[i, Y] * y + A[i, PSI] * psi + A[i, V_X] * v_x + A[i, V_Y] * v_y + A[i, R] * r
         sens_next[S, c] += sens[S, c]
     for i in range(6):
         sens_next[i, n - 2] += B[i, 0]
@@ -76,7 +74,7 @@ def propagate(A: np.ndarray, B: np.ndarray, sens: np.ndarray, sens_next: np.ndar
 
 
 @jit
-def add_square(work: np.ndarray, weight: float, residual: float, n: int) -> float:
+def add_square(work: Record, weight: float, residual: float, n: int) -> float:
     """Add ``weight (residual + row . dU)^2`` to the model; fills the Hessian's lower triangle.
 
     Args:
@@ -98,7 +96,7 @@ def add_square(work: np.ndarray, weight: float, residual: float, n: int) -> floa
 
 @jit
 def add_tracking(
-    work: np.ndarray,
+    work: Record,
     weights: PredictiveParameters,
     dt: float,
     z: np.ndarray,
@@ -140,7 +138,7 @@ def add_tracking(
 
 
 @jit
-def add_effort(work: np.ndarray, weights: PredictiveParameters, U: np.ndarray) -> float:
+def add_effort(work: Record, weights: PredictiveParameters, U: np.ndarray) -> float:
     """Add the effort ``sum_j Q_a a(j)^2 + Q_delta delta(j)^2`` and complete the symmetric Hessian; return its value."""
     value = 0.0
     for j in range(weights.H_c):

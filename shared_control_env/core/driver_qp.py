@@ -2,8 +2,8 @@
 
 The costs are the automation's without the potential field; the model is linearised about the current
 state and the last command, so that the program is quadratic. Its variables are the H_c commands, scaled
-to their limits, and one slack eps >= 0 with an exact penalty that softens the rows of the safe area C:
-the program is always feasible, and eps is 0 whenever the rows can be kept.
+to their limits, and one slack eps >= 0 with an exact (linear) penalty that softens the rows of the safe area C:
+the program is always feasible, and eps is 0 where the rows can be kept at a cost below the penalty's.
 
 ::
 
@@ -19,10 +19,16 @@ from shared_control_env.core.condensing import add_effort, add_tracking, clear, 
 from shared_control_env.core.dynamics import V_X, V_Y, R, S, Y, implicit_step_jacobian
 from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import Record
 from shared_control_env.core.safe_area import lateral_bounds
 
 SLACK_LINEAR = 200.0
-"""Penalty of the slack [1/m]: above the largest multiplier of the rows in the tests, so it is exact."""
+"""Penalty of the slack [1/m]. It is exact where the rows' multipliers sum to less.
+
+In 50 000 random scenes the sum was at most 61 within 1.9 m of the lane's centre; from the lane's edge on it grows
+without bound, since the first row takes large steering to move, and there the slack gives way by some
+centimetres instead. A penalty of 2000 makes OSQP miss its tolerance now and then.
+"""
 
 SLACK_QUADRATIC = 1.0
 """Curvature of the slack's penalty [1/m^2], which makes the program strictly convex."""
@@ -33,10 +39,10 @@ UNBOUNDED = 1e20
 
 @jit
 def build_program(
-    scene: np.ndarray,
+    scene: Record,
     u_last: np.ndarray,
     p: Parameters,
-    work: np.ndarray,
+    work: Record,
     P: np.ndarray,
     q: np.ndarray,
     A: np.ndarray,

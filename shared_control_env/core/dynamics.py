@@ -24,9 +24,7 @@ PLANT_SUBSTEPS = 2
 
 
 @jit
-def derivative(
-    z: np.ndarray, a: float, delta: float, kappa: float, vehicle: VehicleParameters
-) -> np.ndarray:
+def derivative(z: np.ndarray, a: float, delta: float, kappa: float, vehicle: VehicleParameters) -> np.ndarray:
     """Right-hand side of Eq. 11 in the road frame.
 
     ::
@@ -234,9 +232,7 @@ def extrapolated_step(
 
 
 @jit
-def plant_step(
-    z: np.ndarray, a: float, delta: float, dt: float, vehicle: VehicleParameters, work: np.ndarray
-) -> None:
+def plant_step(z: np.ndarray, a: float, delta: float, dt: float, vehicle: VehicleParameters, work: np.ndarray) -> None:
     """Advance the plant by dt in place: :data:`PLANT_SUBSTEPS` extrapolated steps under a held command.
 
     Args:

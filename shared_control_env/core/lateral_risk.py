@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from math import exp
 
-import numpy as np
-
 from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import LateralRiskParameters
+from shared_control_env.core.records import Record
 from shared_control_env.core.safe_area import boundary_distance
 
 
@@ -49,7 +48,7 @@ def continuous_field(r_b: float, parameters: LateralRiskParameters) -> tuple[flo
 
 
 @jit
-def lateral_risk(area: np.ndarray, s: float, d: float, parameters: LateralRiskParameters) -> float:
+def lateral_risk(area: Record, s: float, d: float, parameters: LateralRiskParameters) -> float:
     """Lateral risk of a predicted position, Eq. 3: ``r_y = max(0, P^r / alpha_f)``; 1 outside C.
 
     Args:

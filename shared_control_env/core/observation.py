@@ -8,7 +8,7 @@ import numpy as np
 
 from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT
+from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT, Record
 from shared_control_env.core.road import curvature_at
 
 PREVIEW = np.array([0.0, 10.0, 20.0, 40.0])
@@ -45,7 +45,7 @@ _SCALES = np.array([scale for _, scale in FEATURES])
 
 
 @jit
-def observe(scene: np.ndarray, memory: np.ndarray, line: np.ndarray, p: Parameters, out: np.ndarray) -> None:
+def observe(scene: Record, memory: Record, line: np.ndarray, p: Parameters, out: np.ndarray) -> None:
     """Write the observation of a scene: :data:`FEATURES` over their scales, clipped.
 
     The fault, the automation's command and its risk are not in it.

@@ -42,9 +42,7 @@ def turn_integrals(theta: float) -> tuple[float, float, float, float]:
 
 
 @jit
-def ctra(
-    x: float, y: float, psi: float, v: float, a: float, r: float, tau: float, xi: np.ndarray
-) -> None:
+def ctra(x: float, y: float, psi: float, v: float, a: float, r: float, tau: float, xi: np.ndarray) -> None:
     """Predict a vehicle over tau under constant acceleration and yaw rate (Eq. 1).
 
     ::

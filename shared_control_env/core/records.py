@@ -1,14 +1,18 @@
 """Structured arrays that the compiled functions read and write: one record an environment.
 
 The single environment holds arrays of no dimension, the vectorised one arrays of many records, and both
-run the same functions on a record. Inside compiled functions the fields are attributes, as those of the named tuples they mirror.
+run the same functions on a record. Inside compiled functions the fields are attributes, as those of the
+named tuples they mirror.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple, get_type_hints
+from typing import Any, NamedTuple, TypeAlias, get_type_hints
 
 import numpy as np
+
+Record: TypeAlias = Any
+"""A record of one of the structured types below, or the named tuple it mirrors; its fields are attributes."""
 
 MAX_HORIZON = 50
 """Longest prediction horizon H_p [steps]."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import Parameters, RewardParameters
+from shared_control_env.core.records import Record
 
 TERMS = RewardParameters._fields
 """Names of the terms, in order."""
@@ -19,9 +20,9 @@ COMFORT_LATERAL = 3.0
 
 @jit
 def reward_terms(
-    previous: np.ndarray,
-    scene: np.ndarray,
-    signals: np.ndarray,
+    previous: Record,
+    scene: Record,
+    signals: Record,
     last_a: float,
     failed: bool,
     p: Parameters,

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from shared_control_env.core.jit import jit
-from shared_control_env.core.records import MAX_CHAIN
+from shared_control_env.core.records import MAX_CHAIN, Record
 
 REACHED, BLOCKED = 0, 1
 """Outcomes of the search: the final region was found, or no passage as wide as the vehicle leads to it."""
@@ -44,9 +44,7 @@ def triangulate(start: float, end: float, low: float, high: float, holes: np.nda
     return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].copy()
 
 
-def find_safe_area(
-    region: np.ndarray, d: float, holes: np.ndarray, min_width: float, area: np.ndarray
-) -> None:
+def find_safe_area(region: np.ndarray, d: float, holes: np.ndarray, min_width: float, area: Record) -> None:
     """Safe area of a rectangular driving region (Table I).
 
     Args:
@@ -61,9 +59,7 @@ def find_safe_area(
 
 
 @jit
-def search_triangles(
-    triangles: np.ndarray, start: float, end: float, d: float, min_width: float, area: np.ndarray
-) -> None:
+def search_triangles(triangles: np.ndarray, start: float, end: float, d: float, min_width: float, area: Record) -> None:
     """Sequence of triangles from the ego to the final region, and its boundaries (Table I, steps 2-4).
 
     The table says only to search adjacent triangles until the final one is found. Readings: the fewest
@@ -87,9 +83,7 @@ def search_triangles(
         _start_chains(area, start, d)
         area.end, area.outcome = start, BLOCKED
         return
-    parent, entry, goal, front_edge = _search(
-        triangles, neighbours, first, rear_edge, start, end, d, min_width
-    )
+    parent, entry, goal, front_edge = _search(triangles, neighbours, first, rear_edge, start, end, d, min_width)
     if goal >= 0:
         area.outcome = REACHED
         _trace_sequence(triangles, parent, entry, goal, front_edge, area)
@@ -272,7 +266,7 @@ def _search(
 
 
 @jit
-def _start_chains(area: np.ndarray, s: float, d: float) -> None:
+def _start_chains(area: Record, s: float, d: float) -> None:
     """Set both boundaries to a single point, the form of an empty area."""
     area.lower[:, 0] = s
     area.lower[:, 1] = d
@@ -290,7 +284,7 @@ def _append(chain: np.ndarray, n: int, s: float, d: float) -> int:
 
 
 @jit
-def _finish_chains(area: np.ndarray, n_lower: int, n_upper: int) -> None:
+def _finish_chains(area: Record, n_lower: int, n_upper: int) -> None:
     """Repeat the last vertices to the arrays' ends; a chain that filled its array may be cut: blocked there."""
     if n_lower == MAX_CHAIN or n_upper == MAX_CHAIN:
         area.outcome = BLOCKED
@@ -302,7 +296,7 @@ def _finish_chains(area: np.ndarray, n_lower: int, n_upper: int) -> None:
 
 @jit
 def _trace_sequence(
-    triangles: np.ndarray, parent: np.ndarray, entry: np.ndarray, goal: int, front_edge: int, area: np.ndarray
+    triangles: np.ndarray, parent: np.ndarray, entry: np.ndarray, goal: int, front_edge: int, area: Record
 ) -> None:
     """Boundaries of the sequence: left and right ends of every edge it crosses, from rear to front."""
     sequence = np.empty(triangles.shape[0], dtype=np.int64)
@@ -332,7 +326,7 @@ def _trace_reachable(
     parent: np.ndarray,
     entry: np.ndarray,
     first: int,
-    area: np.ndarray,
+    area: Record,
 ) -> None:
     """Outline of all triangles entered, from the right end of the rear edge around to its left end.
 
@@ -371,8 +365,8 @@ def _trace_reachable(
 
 
 @jit
-def _on_open_end(area: np.ndarray, s: float) -> float:
-    """s clamped to the area's open ends: behind the ego, and at the final region where that was reached.
+def _on_open_end(area: Record, s: float) -> float:
+    """Path length clamped to the area's open ends: behind the ego, and at the final region where that was reached.
 
     Both are lines across the road, not boundaries; the boundaries count as going straight on there.
     What lies beyond a blocked end stays outside.
@@ -415,7 +409,7 @@ def _nearest_on_chain(chain: np.ndarray, s: float, d: float) -> tuple[float, flo
 
 
 @jit
-def boundary_distance(area: np.ndarray, s: float, d: float) -> tuple[float, float, float]:
+def boundary_distance(area: Record, s: float, d: float) -> tuple[float, float, float]:
     """Distance r_b from a point to the nearer boundary of C; 0 outside C.
 
     Args:
@@ -439,7 +433,7 @@ def boundary_distance(area: np.ndarray, s: float, d: float) -> tuple[float, floa
 
 
 @jit
-def lateral_bounds(area: np.ndarray, s: float) -> tuple[float, float]:
+def lateral_bounds(area: Record, s: float) -> tuple[float, float]:
     """Lateral extent of C at path length s: the lowest upper and the highest lower boundary there.
 
     Args:

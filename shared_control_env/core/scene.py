@@ -19,6 +19,7 @@ from shared_control_env.core.records import (
     NEAR_SPEED,
     PRESENT,
     SPEED,
+    Record,
     X,
     Y,
 )
@@ -79,9 +80,7 @@ def find_neighbours(
 
 
 @jit
-def perceive(
-    k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p: Parameters, scene: np.ndarray
-) -> None:
+def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p: Parameters, scene: Record) -> None:
     """Fill the scene at one time step, but for its safe area.
 
     The target speed is the preceding vehicle's where that is slower (Section VI: "follow the
@@ -121,9 +120,7 @@ def perceive(
 
 
 @jit
-def holes_in_region(
-    traffic: np.ndarray, line: np.ndarray, region: np.ndarray, corners: np.ndarray
-) -> int:
+def holes_in_region(traffic: np.ndarray, line: np.ndarray, region: np.ndarray, corners: np.ndarray) -> int:
     """Corners, in the road frame, of the vehicles that reach into the driving region.
 
     Args:

@@ -34,11 +34,9 @@ def _section(name: str, parameters: type, *left_out: str, **more: Any) -> Any:
     The class goes by the name that it is assigned to here, so that it can be pickled.
     """
     hints = get_type_hints(parameters, include_extras=True)
-    defaults = parameters._field_defaults  # type: ignore[attr-defined]
+    defaults = parameters._field_defaults
     fields = {field: (hints[field], defaults[field]) for field in defaults if field not in left_out}
-    return create_model(
-        name, __base__=_Section, __module__=__name__, __doc__=parameters.__doc__, **fields, **more
-    )
+    return create_model(name, __base__=_Section, __module__=__name__, __doc__=parameters.__doc__, **fields, **more)
 
 
 class Segment(_Section):
@@ -268,8 +266,8 @@ def _check_vehicle(settings: Settings) -> None:
     critical = core.critical_speed(vehicle)
     fastest = max(settings.ego.speed, settings.task.target_speed)
     what = (
-        f"config['vehicle'] = {vehicle} oversteers with a critical speed of {critical:.1f} m/s (l_f C_f must not exceed "
-        "l_r C_r by too much)"
+        f"config['vehicle'] = {vehicle} oversteers with a critical speed of {critical:.1f} m/s "
+        "(l_f C_f must not exceed l_r C_r by too much)"
     )
     if critical <= fastest:
         raise ValueError(f"{what}; it must lie above the task's highest speed, {fastest} m/s")

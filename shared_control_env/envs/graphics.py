@@ -107,21 +107,20 @@ class SharedControlViewer(EnvViewer):
         env, signals = self.env, self.env.signals
         width, top = self.frame_surface.get_width(), self.frame_surface.get_height() - PANEL_HEIGHT
         pygame.draw.rect(self.frame_surface, BACKGROUND, (0, top, width, PANEL_HEIGHT))
-        active = bool(env.faults.shape[0] and (env.faults[:, 1] <= env.scene["t"]).any())
         self._write(
             f"t = {env.scene['t']:.2f} s     v = {env.vehicle.speed:.1f} m/s     "
             f"y = {env.scene['z'][1] - env.scene['y_target']:+.2f} m     law: {env.settings.authority.law}     "
-            f"fault: {'active' if active else 'none'}",
+            f"fault: {'active' if env.fault_active else 'none'}",
             (14, top + 10),
         )
-        for i, (name, value, colour) in enumerate(
+        for i, (name, key, colour) in enumerate(
             (
-                ("longitudinal risk r_x", signals["r_x"], RISK),
-                ("lateral risk r_y", signals["r_y"], RISK),
-                ("authority alpha_a", signals["alpha_a"], AUTHORITY),
+                ("longitudinal risk r_x", "r_x", RISK),
+                ("lateral risk r_y", "r_y", RISK),
+                ("authority alpha_a", "alpha_a", AUTHORITY),
             )
         ):
-            self._bar(name, float(value), (14, top + 42 + 36 * i), 0.32 * width, colour, False)
+            self._bar(name, float(signals[key]), (14, top + 42 + 36 * i), 0.32 * width, colour, False)
         limits = env.parameters["limits"]
         for channel, (title, unit, bound, shown) in enumerate(
             (
@@ -159,9 +158,7 @@ class SharedControlViewer(EnvViewer):
         if centred:
             middle = x + 0.5 * width
             length = 0.5 * width * abs(value)
-            pygame.draw.rect(
-                self.frame_surface, colour, (middle if value > 0 else middle - length, y + 17, length, 9)
-            )
+            pygame.draw.rect(self.frame_surface, colour, (middle if value > 0 else middle - length, y + 17, length, 9))
             pygame.draw.line(self.frame_surface, INK, (middle, y + 15), (middle, y + 27))
         else:
             pygame.draw.rect(self.frame_surface, colour, (x, y + 17, width * value, 9))

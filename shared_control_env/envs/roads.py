@@ -70,15 +70,11 @@ def road_network(line: np.ndarray, lanes: int, lane_width: float) -> RoadNetwork
                 right = LineType.CONTINUOUS
             if row[KAPPA] and left == LineType.CONTINUOUS_LINE:
                 left = LineType.CONTINUOUS
-            network.add_lane(
-                str(i), str(i + 1), _lane(line, row, lane * lane_width, lane_width, (right, left))
-            )
+            network.add_lane(str(i), str(i + 1), _lane(line, row, lane * lane_width, lane_width, (right, left)))
     return network
 
 
-def _lane(
-    line: np.ndarray, row: np.ndarray, d: float, width: float, line_types: tuple[int, int]
-) -> AbstractLane:
+def _lane(line: np.ndarray, row: np.ndarray, d: float, width: float, line_types: tuple[int, int]) -> AbstractLane:
     """One lane of one segment, at offset d from the reference line."""
     common = {"width": width, "line_types": line_types, "speed_limit": None}
     begin, kappa = np.array(point_at(line, row[S0], d)[:2]), row[KAPPA]

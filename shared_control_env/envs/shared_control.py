@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -52,7 +52,7 @@ class SharedControlEnv(AbstractEnv):
         observation: the last observation.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
 
     def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
         # highway-env updates metadata, which is the class's own dict, at every reset.
@@ -180,16 +180,15 @@ class SharedControlEnv(AbstractEnv):
         self.road.vehicles = [ego]
         for vehicle in settings.vehicles:
             x, y, psi = point_at(self.line, vehicle.position, settings.lane_centre(vehicle.lane))
-            self.road.vehicles.append(
-                self._vehicle_class(self.road, (x, y), heading=psi, speed=vehicle.speed)
-            )
+            self.road.vehicles.append(self._vehicle_class(self.road, (x, y), heading=psi, speed=vehicle.speed))
 
     def _perceive_and_plan(self) -> None:
         """Perceive the scene, find its safe area, let the automation decide, degrade it, assess the risk."""
         p, scene, signals, state = self.parameters, self.scene, self.signals, self.vehicle.array
         self._path[self.steps] = state[:2]
         count = single.sense(self.steps, state, self.traffic, self.line, p, scene, self._corners)
-        single.search(triangulate(*scene["region"].tolist(), self._corners[:count]), p, scene)
+        start, end, low, high = scene["region"].tolist()
+        single.search(triangulate(start, end, low, high, self._corners[:count]), p, scene)
         self.solution = self.automation.act(scene)
         signals["u_a_des"] = self.solution.command
         signals["status"], signals["iterations"] = self.solution.status, self.solution.iterations
@@ -286,7 +285,7 @@ class SharedControlEnv(AbstractEnv):
             "safe_area_upper": area["upper"],
             "safe_area_outcome": int(area["outcome"]),
             "fault": signals["u_a_f"] - signals["u_a_des"],
-            "fault_active": bool(self.faults.shape[0] and (self.faults[:, ONSET] <= scene["t"]).any()),
+            "fault_active": self.fault_active,
             "automation": {
                 "status": int(signals["status"]),
                 "iterations": int(signals["iterations"]),
@@ -305,6 +304,11 @@ class SharedControlEnv(AbstractEnv):
             "lane_departures": int(self._lane_departures),
             "rewards": dict(zip(reward.TERMS, self._terms.tolist(), strict=True)),
         }
+
+    @property
+    def fault_active(self) -> bool:
+        """Whether any degradation has set in at the scene's time."""
+        return bool((self.faults[:, ONSET] <= self.scene["t"]).any())
 
     @property
     def traffic(self) -> np.ndarray:

@@ -32,15 +32,11 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         RecordConstructorArgs.__init__(self, driver=driver)
         SlotWrapper.__init__(self, env, DRIVER)
         if driver is not None and not isinstance(driver, Driver):
-            raise ValueError(
-                f"driver = {driver!r} must have reset(seed) and act(observation, scene) -> [a, delta]"
-            )
+            raise ValueError(f"driver = {driver!r} must have reset(seed) and act(observation, scene) -> [a, delta]")
         self._given = driver
         self.driver: Driver = driver or PredictiveDriver(parameters_of(self.shared.settings))
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset environment and driver; the driver's seed is drawn from the environment's generator."""
         observation, info = self.env.reset(seed=seed, options=options)
         if self._given is None and options and "config" in options:

@@ -33,9 +33,7 @@ class SlotWrapper(gym.ActionWrapper):
         self.slot = slot
         self._inner_slots = open_slots(env)
         if slot not in self._inner_slots:
-            raise ValueError(
-                f"slot {slot!r} of {env} is bound already; open are {list(self._inner_slots)}"
-            )
+            raise ValueError(f"slot {slot!r} of {env} is bound already; open are {list(self._inner_slots)}")
         rest = {name: SLOT_SPACES[name] for name in self._inner_slots if name != slot}
         self.open_slots = tuple(rest)
         self.action_space: spaces.Space = spaces.Discrete(1)

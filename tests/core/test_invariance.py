@@ -52,7 +52,9 @@ def test_rotation_and_translation(kappa):
     for _ in range(100):
         line, state, others, u = situation(rng, kappa)
         here = risks(state, others, line, u)
-        there_line, there_state, there_others = moved(line, state, others, rng.uniform(-3, 3), rng.uniform(-500, 500, 2))
+        there_line, there_state, there_others = moved(
+            line, state, others, rng.uniform(-3, 3), rng.uniform(-500, 500, 2)
+        )
         assert risks(there_state, there_others, there_line, u) == pytest.approx(here, abs=1e-8)
         seen.append(here)
     assert (np.ptp(seen, axis=0) > 0.3).all()  # the sample does cover both risks

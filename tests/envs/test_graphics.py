@@ -51,9 +51,7 @@ def test_left_is_up():
 
 
 def test_frames_repeat():
-    np.testing.assert_array_equal(
-        frame_after("SharedControl/Curve-v0", 20), frame_after("SharedControl/Curve-v0", 20)
-    )
+    np.testing.assert_array_equal(frame_after("SharedControl/Curve-v0", 20), frame_after("SharedControl/Curve-v0", 20))
 
 
 def test_closing_one_viewer_leaves_the_other_alive():

@@ -58,13 +58,9 @@ def test_two_lane_loop_mirrors():
     right = [dict(fault, size=-0.3) for fault in faults]
     common = {"authority": {"law": "proportional"}}
     vehicles = [(0, 38.0, 12.0), (1, 30.0, 15.0), (1, -5.0, 12.0)]
-    place = lambda flip: [
-        {"lane": 1 - lane if flip else lane, "position": s, "speed": v} for lane, s, v in vehicles
-    ]
+    place = lambda flip: [{"lane": 1 - lane if flip else lane, "position": s, "speed": v} for lane, s, v in vehicles]
     here = TwoLaneEnv({**common, "faults": faults, "vehicles": place(False), "ego": {"lateral_offset": 0.4}})
-    there = TwoLaneEnv(
-        {**common, "faults": right, "vehicles": place(True), "ego": {"lane": 1, "lateral_offset": -0.4}}
-    )
+    there = TwoLaneEnv({**common, "faults": right, "vehicles": place(True), "ego": {"lane": 1, "lateral_offset": -0.4}})
     np.testing.assert_allclose(closed_loop(there, 120), closed_loop(here, 120) * ODD, atol=2e-6)
 
 

@@ -1,0 +1,53 @@
+# Needs Python 3.11 or later and make. Every target sets itself up in $(VENV).
+PYTHON ?= python3
+VENV ?= .venv
+BIN = $(VENV)/bin
+PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
+
+.PHONY: help install reproduce test lint types bench figures clean
+
+help:
+	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
+	@echo "make test       lint, types and all tests"
+	@echo "make bench      speed, as ratios against highway-env and SciPy in the same run"
+	@echo "make figures    copy the README's pictures from results/paper"
+	@echo "make clean      remove the virtual environment"
+
+$(VENV)/bin/python:
+	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" || \
+		{ echo "Python 3.11 or later is needed; set PYTHON=/path/to/it"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.experiments: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(PIP) -e ".[experiments]"
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/bin/python pyproject.toml constraints.txt
+	$(PIP) "torch==2.13.0"
+	$(PIP) -e ".[dev,train]"
+	@touch $@ $(VENV)/.experiments
+
+install: $(VENV)/.experiments
+
+reproduce: $(VENV)/.experiments
+	$(BIN)/python -m experiments.reproduce $(ARGS)
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.dev
+	$(BIN)/mypy
+
+test: lint types
+	$(BIN)/python -m pytest -q $(ARGS)
+
+bench: $(VENV)/.dev
+	$(BIN)/python -m benchmarks $(ARGS)
+
+figures: reproduce
+	mkdir -p docs
+	cp results/paper/case1_path.png results/paper/case2_path.png docs/
+
+clean:
+	rm -rf $(VENV)

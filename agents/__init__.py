@@ -1,0 +1,1 @@
+"""Drivers that plug into :class:`shared_control_env.wrappers.DriverModel`."""

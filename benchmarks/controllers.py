@@ -1,0 +1,111 @@
+"""Solvers against SciPy on the same compiled cost, their gap to the optimum, and the OSQP driver's time."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import gymnasium as gym
+import numpy as np
+from scipy.optimize import minimize
+
+from benchmarks.timing import Timing, time_block
+from shared_control_env.core import single
+from shared_control_env.core.condensing import WORKSPACE
+from shared_control_env.core.records import MAX_CONTROL
+from shared_control_env.wrappers import DriverModel
+
+
+class Gaps(NamedTuple):
+    """Relative cost gap to the converged optimum, 95th percentile.
+
+    Attributes:
+        cold: from zero, with the iterations of the first step.
+        warm: from the solution of the step before, with the iterations of later steps.
+    """
+
+    cold: float
+    warm: float
+
+
+def scenes(count: int) -> list[np.ndarray]:
+    """Scenes of a closed loop with degraded automation, from random starts."""
+    rng = np.random.default_rng(0)
+    found: list[np.ndarray] = []
+    while len(found) < count:
+        start = {"speed": float(rng.uniform(6.0, 25.0)), "lateral_offset": float(rng.uniform(-1.5, 1.5))}
+        config = {"ego": start, "authority": {"law": "proportional"}}
+        env = DriverModel(gym.make("SharedControl/TwoLane-v0", config=config))
+        env.reset(seed=0)
+        for _ in range(20):
+            found.append(env.unwrapped.scene.copy())  # type: ignore[attr-defined]
+            if env.step(0)[2]:
+                break
+    return found[:count]
+
+
+def parameters_and_limits() -> tuple[np.ndarray, np.ndarray]:
+    """Packed parameters of the environment, and the scale of the commands."""
+    env = gym.make("SharedControl/TwoLane-v0").unwrapped
+    return env.parameters, env.command_limits  # type: ignore[attr-defined]
+
+
+def automation(found: list[np.ndarray], repeats: int) -> tuple[Timing, Timing, Gaps]:
+    """Two Gauss-Newton iterations and SLSQP to convergence, and the gaps in cost."""
+    parameters, scale = parameters_and_limits()
+    work, U = np.zeros((), WORKSPACE), np.zeros((MAX_CONTROL, 2))
+    H_c = int(parameters["automation"]["H_c"])
+
+    def ours() -> int:
+        for scene in found:
+            U[:] = 0.0
+            single.solve_automation(U, scene, parameters, 2, work)
+        return len(found)
+
+    def slsqp(scene: np.ndarray) -> float:
+        trial = np.zeros((MAX_CONTROL, 2))
+
+        def cost(x: np.ndarray) -> float:
+            trial[:H_c] = x.reshape(H_c, 2) * scale
+            return single.automation_cost(trial, scene, parameters, work)
+
+        bounds = [(-1.0, 1.0)] * (2 * H_c)
+        return minimize(cost, np.zeros(2 * H_c), method="SLSQP", bounds=bounds, options={"ftol": 1e-10}).fun
+
+    some = found[:: max(1, len(found) // 40)]
+
+    def theirs() -> int:
+        for scene in some:
+            slsqp(scene)
+        return len(some)
+
+    cold, warm = [], []
+    for before, scene in zip(found[:-1], found[1:], strict=True):
+        U[:] = 0.0
+        best = single.solve_automation(U, scene, parameters, 200, work)[3]
+        U[:] = 0.0
+        first = int(parameters["authority"]["first_iterations"])
+        value = single.solve_automation(U, scene, parameters, first, work)[3]
+        cold.append((value - best) / max(best, 1e-6))
+        if scene["k"] > 0:
+            U[:] = 0.0
+            single.solve_automation(U, before, parameters, 200, work)
+            U[: H_c - 1] = U[1:H_c]
+            value = single.solve_automation(U, scene, parameters, int(parameters["authority"]["iterations"]), work)[3]
+            warm.append((value - best) / max(best, 1e-6))
+    gaps = Gaps(float(np.percentile(cold, 95)), float(np.percentile(warm, 95)))
+    return time_block(ours, repeats), time_block(theirs, max(3, repeats // 5)), gaps
+
+
+def osqp_driver(episodes: int) -> Timing:
+    """Condensing and solving the driver's program at eps 1e-5 along closed-loop episodes of both cases."""
+    seconds = []
+    for name in ("SharedControl/TwoLane-v0", "SharedControl/Curve-v0"):
+        env = DriverModel(gym.make(name, config={"authority": {"law": "proportional"}}))
+        for _ in range(episodes):
+            env.reset(seed=0)
+            done = False
+            while not done:
+                _, _, terminated, truncated, _ = env.step(0)
+                done = terminated or truncated
+                seconds.append(env.driver.solution.time)  # type: ignore[attr-defined]
+    return Timing.of(seconds)

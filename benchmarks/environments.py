@@ -1,0 +1,61 @@
+"""Steps of the environments against highway-env's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import gymnasium as gym
+import highway_env
+import numpy as np
+
+import shared_control_env
+from benchmarks.timing import Timing, time_block
+from shared_control_env.wrappers import DriverModel
+
+STEPS = 200
+"""Steps of one measured block."""
+
+
+def stepper(env: gym.Env, action: Callable[[], object], steps: int) -> Callable[[], int]:
+    """A block of steps that resets where an episode ends."""
+    env.reset(seed=0)
+
+    def block() -> int:
+        for _ in range(steps):
+            _, _, terminated, truncated, _ = env.step(action())
+            if terminated or truncated:
+                env.reset()
+        return steps
+
+    return block
+
+
+def highway(repeats: int) -> Timing:
+    """highway-env with 4 vehicles, ContinuousAction (dynamical), Kinematics, 20 Hz simulation and policy."""
+    gym.register_envs(highway_env)
+    config = {
+        "vehicles_count": 3,
+        "lanes_count": 2,
+        "action": {"type": "ContinuousAction", "dynamical": True},
+        "observation": {"type": "Kinematics"},
+        "simulation_frequency": 20,
+        "policy_frequency": 20,
+        "duration": 10,
+    }
+    env = gym.make("highway-v0", config=config)
+    env.action_space.seed(0)
+    return time_block(stepper(env, env.action_space.sample, 100), repeats)
+
+
+def limited(repeats: int) -> Timing:
+    """TwoLane-v0: limiter, triangulation at every step, random driver actions."""
+    gym.register_envs(shared_control_env)
+    env = gym.make("SharedControl/TwoLane-v0")
+    env.action_space.seed(0)
+    return time_block(stepper(env, env.action_space.sample, STEPS), repeats)
+
+
+def closed_loop(repeats: int) -> Timing:
+    """TwoLane-v0 with the OSQP driver bound too."""
+    env = DriverModel(gym.make("SharedControl/TwoLane-v0"))
+    return time_block(stepper(env, lambda: np.int64(0), STEPS), repeats)

@@ -1,0 +1,25 @@
+"""The benchmark's parts run and count what they say; their times are not tested."""
+
+import numpy as np
+
+from benchmarks import controllers, environments
+from benchmarks.timing import Timing, time_block
+
+
+def test_timing():
+    calls = []
+    timing = time_block(lambda: calls.append(1) or 2, repeats=5)
+    assert len(calls) == 6
+    assert 0.0 <= timing.low <= timing.median <= timing.high
+    assert str(Timing(1e-6, 5e-7, 2e-6)) == "1.0 us (0.5 to 2.0)"
+
+
+def test_every_part_runs():
+    for part in (environments.highway, environments.limited, environments.closed_loop):
+        assert part(1).median > 0.0
+    found = controllers.scenes(30)
+    assert len(found) == 30
+    assert not np.array_equal(found[0]["z"], found[-1]["z"])
+    ours, slsqp, gaps = controllers.automation(found, 1)
+    assert 0.0 < ours.median < slsqp.median
+    assert np.isfinite(gaps).all()

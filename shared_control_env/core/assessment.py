@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shared_control_env.core.dynamics import V_X, R, implicit_step
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit_inlined
 from shared_control_env.core.lateral_risk import lateral_risk
 from shared_control_env.core.longitudinal_risk import longitudinal_risk
 from shared_control_env.core.parameters import Parameters
@@ -24,7 +24,7 @@ from shared_control_env.core.records import (
 from shared_control_env.core.road import locate
 
 
-@jit
+@jit_inlined
 def predict_ego(scene: Record, u_f: np.ndarray, line: np.ndarray, p: Parameters, signals: Record) -> None:
     """Prediction xi(k + tau_p) of the ego under the degraded command (Eq. 1).
 
@@ -49,7 +49,7 @@ def predict_ego(scene: Record, u_f: np.ndarray, line: np.ndarray, p: Parameters,
     signals.prediction_road[0], signals.prediction_road[1] = s, d
 
 
-@jit
+@jit_inlined
 def predict_neighbours(scene: Record, traffic: np.ndarray, line: np.ndarray, tau: float, predicted: np.ndarray) -> None:
     """Prediction of the three neighbours by Eq. 1 under their present acceleration and yaw rate.
 
@@ -70,7 +70,7 @@ def predict_neighbours(scene: Record, traffic: np.ndarray, line: np.ndarray, tau
             predicted[i, 2] = xi[3]
 
 
-@jit
+@jit_inlined
 def assess(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: Record) -> None:
     """Both risks of letting ``signals.u_a_f`` drive the car (Eq. 1-8).
 

@@ -13,21 +13,44 @@ from shared_control_env.core.assessment import assess
 from shared_control_env.core.authority import apply_law
 from shared_control_env.core.degradation import degrade
 from shared_control_env.core.driver_lag import advance_lag
-from shared_control_env.core.jit import jit
+from shared_control_env.core.info import note_outcome
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import Record
+from shared_control_env.core.reward import reward_terms, weighted_sum
 
 
-@jit
+@jit_inlined
 def clear_memory(memory: Record) -> None:
     """State of a loop that has not run: no command, full authority on display."""
     memory.u_h_act[:] = 0.0
     memory.u_h_des[:] = 0.0
     memory.u[:] = 0.0
     memory.alpha_a = 1.0
+    memory.in_lane = True
+    memory.lane_departures = 0
+    memory.driver_failures = 0
 
 
-@jit
+@jit_inlined
+def clear_signals(signals: Record) -> None:
+    """Signals before anything is planned or applied: no command, full authority on display."""
+    for vector in (
+        signals.u_a_des,
+        signals.u_a_f,
+        signals.u_a_act,
+        signals.u_h_des,
+        signals.u_h_act,
+        signals.u,
+        signals.prediction_road,
+    ):
+        vector[0], vector[1] = 0.0, 0.0
+    signals.prediction[:] = 0.0
+    signals.r_x, signals.r_y, signals.alpha_a = 0.0, 0.0, 1.0
+    signals.status, signals.iterations, signals.residual = 0, 0, 0.0
+
+
+@jit_inlined
 def clear_automation(memory: Record) -> None:
     """State of an automation that has not run."""
     memory.U[:] = 0.0
@@ -35,7 +58,7 @@ def clear_automation(memory: Record) -> None:
     memory.failures = 0
 
 
-@jit
+@jit_inlined
 def automate(scene: Record, p: Parameters, memory: Record, work: Record) -> tuple[int, int, float]:
     """The automation's desired command u_a,des (Eq. 13), left in ``memory.u_a_des``.
 
@@ -61,7 +84,7 @@ def automate(scene: Record, p: Parameters, memory: Record, work: Record) -> tupl
     return status, done, residual
 
 
-@jit
+@jit_inlined
 def monitor(
     scene: Record,
     traffic: np.ndarray,
@@ -84,7 +107,7 @@ def monitor(
     assess(scene, traffic, line, p, signals)
 
 
-@jit
+@jit_inlined
 def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, memory: Record, signals: Record) -> None:
     """Second half of a step: u_a,act (Eq. 10), u_h,act (Eq. 16) and ``u = clip(u_a,act + u_h,act)``.
 
@@ -105,3 +128,54 @@ def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, memory: Record, si
         memory.u_h_des[i], memory.u[i] = u_h_des[i], signals.u[i]
     advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
     memory.alpha_a = alpha_a
+
+
+@jit
+def is_on_road(scene: Record, p: Parameters) -> bool:
+    """Whether the ego's centre is between the road's edges."""
+    return p.task.road_low <= scene.z[1] <= p.task.road_high
+
+
+@jit_inlined
+def count_departures(scene: Record, p: Parameters, memory: Record) -> None:
+    """Count in memory each time that the ego's centre leaves the lane to keep."""
+    in_lane = abs(scene.z[1] - scene.y_target) <= 0.5 * p.task.lane_width
+    if memory.in_lane and not in_lane:
+        memory.lane_departures += 1
+    memory.in_lane = in_lane
+
+
+@jit_inlined
+def conclude(
+    previous_s: float,
+    last_a: float,
+    crashed: bool,
+    scene: Record,
+    signals: Record,
+    p: Parameters,
+    memory: Record,
+    terms: np.ndarray,
+    info: Record,
+) -> tuple[float, bool]:
+    """Reward and end of a step, once the scene it led to is perceived.
+
+    Args:
+        previous_s: path length before the step [m].
+        last_a: acceleration command of the step before [m/s^2].
+        crashed: whether the ego has collided.
+        scene: record of :data:`records.SCENE` after the step.
+        signals: record of :data:`records.SIGNALS` that holds the step's commands.
+        p: parameters.
+        memory: record of :data:`records.MEMORY`.
+        terms: written, shape (7,).
+        info: record of :data:`info.INFO`, completed.
+
+    Returns:
+        Reward, and whether the episode terminates: by a collision or off the road.
+    """
+    on_road = is_on_road(scene, p)
+    terminated = crashed or not on_road
+    reward_terms(previous_s, scene, signals, last_a, terminated, p, terms)
+    count_departures(scene, p, memory)
+    note_outcome(scene.z[3], crashed, on_road, memory, terms, info)
+    return weighted_sum(terms, p.reward), terminated

@@ -11,6 +11,16 @@ from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, X,
 
 
 @jit
+def _separated(row: np.ndarray, other: np.ndarray, dx: float, dy: float, c: float, s: float) -> bool:
+    """Whether an axis of the first vehicle separates the two; c and s are of the angle between them, absolute."""
+    ct, st = cos(row[HEADING]), sin(row[HEADING])
+    along, across = abs(dx * ct + dy * st), abs(dy * ct - dx * st)
+    return along > 0.5 * (row[BODY_LENGTH] + c * other[BODY_LENGTH] + s * other[BODY_WIDTH]) or across > 0.5 * (
+        row[BODY_WIDTH] + s * other[BODY_LENGTH] + c * other[BODY_WIDTH]
+    )
+
+
+@jit
 def overlap(first: np.ndarray, second: np.ndarray) -> bool:
     """Whether two vehicles' rectangles overlap, by the separating axes of both.
 
@@ -23,14 +33,7 @@ def overlap(first: np.ndarray, second: np.ndarray) -> bool:
         return False
     turn = second[HEADING] - first[HEADING]
     c, s = abs(cos(turn)), abs(sin(turn))
-    for row, other in ((first, second), (second, first)):
-        ct, st = cos(row[HEADING]), sin(row[HEADING])
-        along, across = abs(dx * ct + dy * st), abs(dy * ct - dx * st)
-        if along > 0.5 * (row[BODY_LENGTH] + c * other[BODY_LENGTH] + s * other[BODY_WIDTH]):
-            return False
-        if across > 0.5 * (row[BODY_WIDTH] + s * other[BODY_LENGTH] + c * other[BODY_WIDTH]):
-            return False
-    return True
+    return not (_separated(first, second, dx, dy, c, s) or _separated(second, first, dx, dy, c, s))
 
 
 @jit

@@ -23,7 +23,20 @@ def jit(function: F) -> F:
     Divisions follow IEEE 754 as in NumPy. Neither fast-math nor threads are used within a function, so
     that rollouts repeat to the bit.
     """
-    dispatcher = njit(cache=True, error_model="numpy", nogil=True)(function)
+    return _compile(function, inline="never")
+
+
+def jit_inlined(function: F) -> F:
+    """As :func:`jit`, for a function that one or two others call: it is compiled as a part of them.
+
+    LLVM optimises all that a function calls anew for each of its callers, so that every layer of a deep
+    composition would cost as much to compile as the whole.
+    """
+    return _compile(function, inline="always")
+
+
+def _compile(function: F, inline: str) -> F:
+    dispatcher = njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True, inline=inline)(function)
     _drop_stale_cache(dispatcher.stats.cache_path)
     return cast(F, dispatcher)
 

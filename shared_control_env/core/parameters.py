@@ -75,7 +75,7 @@ class PredictiveParameters(NamedTuple):
         R: weight of the potential-field value squared [-]; ours (automation only).
     """
 
-    H_p: Annotated[int, Interval(ge=1, le=50)] = 10
+    H_p: Annotated[int, Interval(ge=1, le=30)] = 10
     H_c: Annotated[int, Interval(ge=1, le=10)] = 3
     W: NonNegative = 1.0
     H: NonNegative = 0.1

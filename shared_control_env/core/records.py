@@ -14,13 +14,13 @@ import numpy as np
 Record: TypeAlias = Any
 """A record of one of the structured types below, or the named tuple it mirrors; its fields are attributes."""
 
-MAX_HORIZON = 50
+MAX_HORIZON = 30
 """Longest prediction horizon H_p [steps]."""
 
 MAX_CONTROL = 10
 """Longest control horizon H_c [steps]."""
 
-MAX_CHAIN = 32
+MAX_CHAIN = 20
 """Vertices kept of a boundary of the safe area; shorter ones repeat their last vertex."""
 
 X, Y, HEADING, SPEED, ACCELERATION, YAW_RATE, BODY_LENGTH, BODY_WIDTH = range(8)
@@ -114,6 +114,9 @@ MEMORY = np.dtype(
         ("u_h_des", np.float64, (2,)),  # driver's last desired command
         ("u", np.float64, (2,)),  # last command of the vehicle
         ("alpha_a", np.float64),  # authority last displayed
+        ("in_lane", np.bool_),  # whether the ego's centre is in the lane to keep
+        ("lane_departures", np.int64),  # times that it has left the lane
+        ("driver_failures", np.int64),  # steps at which the vectorised driver's solver failed
     ],
     align=True,
 )

@@ -20,7 +20,7 @@ COMFORT_LATERAL = 3.0
 
 @jit
 def reward_terms(
-    previous: Record,
+    previous_s: float,
     scene: Record,
     signals: Record,
     last_a: float,
@@ -28,7 +28,7 @@ def reward_terms(
     p: Parameters,
     terms: np.ndarray,
 ) -> None:
-    """Terms of one step, from the scene before it to the scene after it.
+    """Terms of one step.
 
     ::
 
@@ -42,7 +42,8 @@ def reward_terms(
         failure  = -1 on a collision or off the road, else 0
 
     Args:
-        previous, scene: records of :data:`records.SCENE` before and after the step.
+        previous_s: path length before the step [m].
+        scene: record of :data:`records.SCENE` after the step.
         signals: record of :data:`records.SIGNALS` of the step.
         last_a: acceleration command of the step before [m/s^2].
         failed: whether the step ended in a collision or off the road.
@@ -51,7 +52,7 @@ def reward_terms(
     """
     task, limits = p.task, p.limits
     u_h, u_a, z = signals.u_h_act, signals.u_a_act, scene.z
-    progress = (z[0] - previous.z[0]) / (task.dt * task.target_speed)
+    progress = (z[0] - previous_s) / (task.dt * task.target_speed)
     terms[0] = min(max(progress, -1.0), 1.0)
     terms[1] = -min(1.0, (2.0 * (z[1] - scene.y_target) / task.lane_width) ** 2)
     terms[2] = -min(1.0, abs(z[3] - scene.v_target) / task.target_speed)

@@ -59,6 +59,21 @@ def find_safe_area(region: np.ndarray, d: float, holes: np.ndarray, min_width: f
 
 
 @jit
+def whole_region(region: np.ndarray, area: Record) -> None:
+    """Safe area of a driving region without a vehicle inside: the region itself, whatever its triangles.
+
+    Args:
+        region: start, end along the road and low, high across it [m], shape (4,).
+        area: record of :data:`records.SAFE_AREA`, written.
+    """
+    for k in range(MAX_CHAIN):
+        s = region[0] if k == 0 else region[1]
+        area.lower[k, 0], area.lower[k, 1] = s, region[2]
+        area.upper[k, 0], area.upper[k, 1] = s, region[3]
+    area.start, area.end, area.outcome = region[0], region[1], REACHED
+
+
+@jit
 def search_triangles(triangles: np.ndarray, start: float, end: float, d: float, min_width: float, area: Record) -> None:
     """Sequence of triangles from the ego to the final region, and its boundaries (Table I, steps 2-4).
 

@@ -127,13 +127,15 @@ def holes_in_region(traffic: np.ndarray, line: np.ndarray, region: np.ndarray, c
         traffic: other vehicles, shape (n, 8).
         line: reference line.
         region: start, end, low, high [m], shape (4,).
-        corners: written, shape (>= n, 4, 2).
+        corners: written, shape (m, 4, 2); more vehicles than m are left out.
 
     Returns:
         How many there are.
     """
     count = 0
     for row in range(traffic.shape[0]):
+        if count == corners.shape[0]:
+            break
         s, d, psi_road, _ = locate(line, traffic[row, X], traffic[row, Y])
         psi = traffic[row, HEADING] - psi_road
         half_length, half_width = 0.5 * traffic[row, BODY_LENGTH], 0.5 * traffic[row, BODY_WIDTH]

@@ -14,8 +14,8 @@ from shared_control_env.core import (
     driver_qp,
     dynamics,
     fuzzy,
+    info,
     observation,
-    reward,
     safe_area,
 )
 from shared_control_env.core import (
@@ -51,6 +51,12 @@ def search(triangles: np.ndarray, parameters: Record, scene: Record) -> None:
 def clear_memory(memory: Record) -> None:
     """:func:`closed_loop.clear_memory`."""
     closed_loop.clear_memory(memory[()])
+
+
+@jit
+def clear_signals(signals: Record) -> None:
+    """:func:`closed_loop.clear_signals`."""
+    closed_loop.clear_signals(signals[()])
 
 
 @jit
@@ -118,19 +124,35 @@ def observe(scene: Record, memory: Record, line: np.ndarray, parameters: Record,
 
 
 @jit
-def reward_terms(
-    previous: Record,
+def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: int, info_record: Record) -> None:
+    """:func:`info.note_signals`."""
+    info.note_signals(scene[()], signals[()], faults, failures, info_record[()])
+
+
+@jit
+def note_start(scene: Record, parameters: Record, memory: Record, info_record: Record) -> None:
+    """:func:`info.note_outcome` of a reset, with zero reward terms."""
+    s = scene[()]
+    on_road = closed_loop.is_on_road(s, parameters[()])
+    info.note_outcome(s.z[3], False, on_road, memory[()], np.zeros(7), info_record[()])
+
+
+@jit
+def conclude(
+    previous_s: float,
+    last_a: float,
+    crashed: bool,
     scene: Record,
     signals: Record,
-    last_a: float,
-    failed: bool,
     parameters: Record,
+    memory: Record,
     terms: np.ndarray,
-) -> float:
-    """:func:`reward.reward_terms`; returns their weighted sum."""
-    p = parameters[()]
-    reward.reward_terms(previous[()], scene[()], signals[()], last_a, failed, p, terms)
-    return reward.weighted_sum(terms, p.reward)
+    info_record: Record,
+) -> tuple[float, bool]:
+    """:func:`closed_loop.conclude`."""
+    return closed_loop.conclude(
+        previous_s, last_a, crashed, scene[()], signals[()], parameters[()], memory[()], terms, info_record[()]
+    )
 
 
 @jit

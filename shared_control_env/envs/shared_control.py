@@ -11,20 +11,19 @@ from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.vehicle.graphics import VehicleGraphics
 
 from shared_control_env.controllers.automation import Automation
-from shared_control_env.core import reward, single
+from shared_control_env.core import single
 from shared_control_env.core.degradation import ONSET
-from shared_control_env.core.records import MEMORY, SCENE, SIGNALS, pack
-from shared_control_env.core.road import curvature_at, point_at, reference_line
+from shared_control_env.core.info import INFO, as_dict
+from shared_control_env.core.records import HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
+from shared_control_env.core.reward import TERMS
 from shared_control_env.core.safe_area import triangulate
 from shared_control_env.envs import config as configuration
 from shared_control_env.envs.action import SlotAction
 from shared_control_env.envs.graphics import SharedControlViewer
 from shared_control_env.envs.observation import DriverObservation
 from shared_control_env.envs.roads import LineRoad
+from shared_control_env.envs.situation import Situation, start_of
 from shared_control_env.envs.vehicles import EgoVehicle
-
-LEAD_IN = 50.0
-"""Straight road behind the ego's start [m]."""
 
 
 class SharedControlEnv(AbstractEnv):
@@ -57,7 +56,7 @@ class SharedControlEnv(AbstractEnv):
     def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
         # highway-env updates metadata, which is the class's own dict, at every reset.
         self.metadata = dict(type(self).metadata)
-        self.scene, self._previous = np.zeros((), SCENE), np.zeros((), SCENE)
+        self.scene = np.zeros((), SCENE)
         self.signals = np.zeros((), SIGNALS)
         self.memory = np.zeros((), MEMORY)
         super().__init__(config=config, render_mode=render_mode)
@@ -136,11 +135,9 @@ class SharedControlEnv(AbstractEnv):
     def _reset(self) -> None:
         """Make road, vehicles and controllers from the settings."""
         settings = self.settings
-        self.parameters = pack(configuration.parameters_of(settings))
+        start = start_of(settings)
+        self.line, self.faults, self.parameters = start.line, start.faults, start.parameters
         self.command_limits = np.array(list(self.parameters["limits"][()]))
-        self.faults = configuration.fault_rows(settings)
-        segments = [(segment.length, segment.curvature) for segment in settings.road.segments]
-        self.line = reference_line(segments, lead_in=LEAD_IN)
         self.road = LineRoad(
             self.line,
             settings.road.lanes,
@@ -148,39 +145,26 @@ class SharedControlEnv(AbstractEnv):
             np_random=self.np_random,
             neighbour_vehicles_connected_lanes=settings.neighbour_vehicles_connected_lanes,
         )
-        self._place_vehicles()
+        self._place_vehicles(start)
         self.road.update_rows()
         self._corners = np.zeros((len(self.traffic), 4, 2))
-        self._terms = np.zeros(len(reward.TERMS))
+        self._terms = np.zeros(len(TERMS))
         self._path = np.zeros((settings.steps + 1, 2))
         self.automation = Automation(self.parameters)
         self.automation.reset()
         single.clear_memory(self.memory)
-        self.signals[()] = np.zeros((), SIGNALS)
-        self.signals["alpha_a"] = self.memory["alpha_a"]
-        self._in_lane = True
-        self._lane_departures = 0
+        single.clear_signals(self.signals)
 
-    def _place_vehicles(self) -> None:
-        settings = self.settings
-        d = settings.lane_centre(settings.ego.lane) + settings.ego.lateral_offset
-        x, y, psi = point_at(self.line, 0.0, d)
-        yaw_rate = settings.ego.speed * curvature_at(self.line, 0.0, d)
-        ego = EgoVehicle(
-            self.road,
-            (x, y),
-            psi,
-            settings.ego.speed,
-            yaw_rate,
-            settings.task.target_speed,
-            self.parameters,
-        )
+    def _place_vehicles(self, start: Situation) -> None:
+        """Put the ego and the other vehicles on the road."""
+        ego = EgoVehicle(self.road, start.ego, self.settings.task.target_speed, self.parameters)
         ego.color = VehicleGraphics.EGO_COLOR
         self.controlled_vehicles = [ego]
         self.road.vehicles = [ego]
-        for vehicle in settings.vehicles:
-            x, y, psi = point_at(self.line, vehicle.position, settings.lane_centre(vehicle.lane))
-            self.road.vehicles.append(self._vehicle_class(self.road, (x, y), heading=psi, speed=vehicle.speed))
+        for x, y, heading, speed in start.traffic[:, [X, Y, HEADING, SPEED]]:
+            self.road.vehicles.append(
+                self._vehicle_class(self.road, (x, y), heading=float(heading), speed=float(speed))
+            )
 
     def _perceive_and_plan(self) -> None:
         """Perceive the scene, find its safe area, let the automation decide, degrade it, assess the risk."""
@@ -208,23 +192,26 @@ class SharedControlEnv(AbstractEnv):
             ValueError: if the action is malformed; nothing has moved then.
         """
         command, alpha_a = self.action_type.decode(action)
-        last_a = float(self.memory["u"][0])
+        last_a, previous_s = float(self.memory["u"][0]), float(self.scene["z"][0])
         single.blend(command, alpha_a, self.parameters, self.memory, self.signals)
+        info = self._note_signals()
         self._simulate(self.signals["u"])
-        played = self.signals.copy()
-        applied = self._signal_info(played)
-        self._previous[()] = self.scene
         self._perceive_and_plan()
-        terminated = self._is_terminated()
-        value = single.reward_terms(
-            self._previous, self.scene, played, last_a, terminated, self.parameters, self._terms
+        reward, terminated = single.conclude(
+            previous_s,
+            last_a,
+            bool(self.vehicle.crashed),
+            self.scene,
+            self.signals,
+            self.parameters,
+            self.memory,
+            self._terms,
+            info,
         )
-        self._count_departures()
         self.observation = self.observation_type.observe()
-        info = {**applied, **self._outcome_info()}
         if self.render_mode == "human":
             self.render()
-        return self.observation.copy(), value, terminated, self._is_truncated(), info
+        return self.observation.copy(), reward, terminated, self._is_truncated(), as_dict(info)
 
     def _simulate(self, u: np.ndarray) -> None:
         """Move all vehicles through one decision's simulation steps under a constant command."""
@@ -235,75 +222,21 @@ class SharedControlEnv(AbstractEnv):
             self.road.step(1.0 / self.settings.simulation_frequency)
         self.steps += 1
 
-    def _is_terminated(self) -> bool:
-        """Collision, or the ego's centre off the road."""
-        return bool(self.vehicle.crashed) or not self._on_road()
-
     def _is_truncated(self) -> bool:
         """End of the duration, counted in whole steps."""
         return self.steps >= self.settings.steps
 
-    def _on_road(self) -> bool:
-        d, task = self.scene["z"][1], self.parameters["task"]
-        return bool(task["road_low"] <= d <= task["road_high"])
-
-    def _count_departures(self) -> None:
-        """Count each time the ego's centre leaves the lane to keep."""
-        offset = abs(self.scene["z"][1] - self.scene["y_target"])
-        in_lane = bool(offset <= 0.5 * self.parameters["task"]["lane_width"])
-        self._lane_departures += self._in_lane and not in_lane
-        self._in_lane = in_lane
+    def _note_signals(self) -> np.ndarray:
+        """A new record of info that holds the signals of the present time step."""
+        info = np.zeros((), INFO)
+        single.note_signals(self.scene, self.signals, self.faults, self.automation.failures, info)
+        return info
 
     def _info(self, obs: Any = None, action: Any = None) -> dict[str, Any]:
-        """Info of a reset; the parent's also carries an unseeded sample of the action, which is left out."""
-        self._terms[:] = 0.0
-        return {**self._signal_info(self.signals.copy()), **self._outcome_info()}
-
-    def _signal_info(self, signals: np.ndarray) -> dict[str, Any]:
-        """Signals of the scene's time step, plain numbers and arrays; ``signals`` is a copy, whose views are given."""
-        scene = self.scene.copy()
-        area = scene["area"]
-        return {
-            "k": int(scene["k"]),
-            "t": float(scene["t"]),
-            "state": scene["state"],
-            "z": scene["z"],
-            "y_target": float(scene["y_target"]),
-            "v_target": float(scene["v_target"]),
-            "u_a_des": signals["u_a_des"],
-            "u_a_f": signals["u_a_f"],
-            "u_a_act": signals["u_a_act"],
-            "u_h_des": signals["u_h_des"],
-            "u_h_act": signals["u_h_act"],
-            "u": signals["u"],
-            "r_x": float(signals["r_x"]),
-            "r_y": float(signals["r_y"]),
-            "alpha_a": float(signals["alpha_a"]),
-            "prediction": signals["prediction"],
-            "prediction_road": signals["prediction_road"],
-            "safe_area_lower": area["lower"],
-            "safe_area_upper": area["upper"],
-            "safe_area_outcome": int(area["outcome"]),
-            "fault": signals["u_a_f"] - signals["u_a_des"],
-            "fault_active": self.fault_active,
-            "automation": {
-                "status": int(signals["status"]),
-                "iterations": int(signals["iterations"]),
-                "residual": float(signals["residual"]),
-                "failures": int(self.automation.failures),
-            },
-        }
-
-    def _outcome_info(self) -> dict[str, Any]:
-        """State after the step, and the unweighted reward terms."""
-        return {
-            "speed": self.vehicle.speed,
-            "crashed": bool(self.vehicle.crashed),
-            "on_road": self._on_road(),
-            "in_lane": self._in_lane,
-            "lane_departures": int(self._lane_departures),
-            "rewards": dict(zip(reward.TERMS, self._terms.tolist(), strict=True)),
-        }
+        """Info of a reset; highway-env's own also carries an unseeded sample of the action, which is left out."""
+        info = self._note_signals()
+        single.note_start(self.scene, self.parameters, self.memory, info)
+        return as_dict(info)
 
     @property
     def fault_active(self) -> bool:
@@ -314,6 +247,24 @@ class SharedControlEnv(AbstractEnv):
     def traffic(self) -> np.ndarray:
         """The other vehicles as rows of :mod:`records`' traffic columns, shape (n, 8)."""
         return self.road.rows[1:]
+
+    def show(
+        self, state: np.ndarray, traffic: np.ndarray, scene: np.ndarray, signals: np.ndarray, path: np.ndarray
+    ) -> None:
+        """Take over another environment's situation of the same settings, to draw it.
+
+        Args:
+            state: of the ego, shape (6,).
+            traffic: of the other vehicles, shape (n, 8).
+            scene, signals: records.
+            path: positions of the ego so far, shape (k + 1, 2).
+        """
+        self.vehicle.array[:] = state
+        for vehicle, row in zip(self.road.vehicles[1:], traffic, strict=True):
+            vehicle.array[:] = row
+        self.scene[()], self.signals[()] = scene, signals
+        self.steps = len(path) - 1
+        self._path[: len(path)] = path
 
     @property
     def path(self) -> np.ndarray:

@@ -89,20 +89,11 @@ class EgoVehicle(ArrayVehicle):
     _POSE = (0, 1, 2, 3)
     _SIZE = 6
 
-    def __init__(
-        self,
-        road: Road,
-        position: Any,
-        heading: float,
-        speed: float,
-        yaw_rate: float,
-        target_speed: float,
-        parameters: np.ndarray,
-    ) -> None:
+    def __init__(self, road: Road, state: np.ndarray, target_speed: float, parameters: np.ndarray) -> None:
         self.parameters = parameters
         self.LENGTH, self.WIDTH = (float(parameters["vehicle"][name]) for name in ("length", "width"))
-        super().__init__(road, position, heading, speed)
-        self.array[5] = yaw_rate
+        super().__init__(road, state[:2], float(state[2]), float(state[3]))
+        self.array[:] = state
         self.target_speed = target_speed
         self._work = np.zeros((2, 6))
 

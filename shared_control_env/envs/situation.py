@@ -1,0 +1,49 @@
+"""The start of an episode as arrays: road, faults, parameters, ego and traffic."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from highway_env.vehicle.kinematics import Vehicle
+
+from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, SPEED, pack
+from shared_control_env.core.road import curvature_at, point_at, reference_line
+from shared_control_env.core.traffic import follow_lane
+from shared_control_env.envs.config import Settings, fault_rows, parameters_of
+
+LEAD_IN = 50.0
+"""Straight road behind the ego's start [m]."""
+
+
+class Situation(NamedTuple):
+    """What an episode starts from.
+
+    Attributes:
+        line: reference line of the road, shape (n, 6).
+        faults: degradations, shape (m, 4).
+        parameters: record of :class:`core.parameters.Parameters`.
+        ego: state [x, y, psi, v_x, v_y, r], shape (6,).
+        traffic: other vehicles as rows of :mod:`core.records`' traffic columns, shape (n_vehicles, 8).
+    """
+
+    line: np.ndarray
+    faults: np.ndarray
+    parameters: np.ndarray
+    ego: np.ndarray
+    traffic: np.ndarray
+
+
+def start_of(settings: Settings) -> Situation:
+    """The situation that settings describe. The ego starts at s = 0, turning with the road."""
+    line = reference_line([(s.length, s.curvature) for s in settings.road.segments], lead_in=LEAD_IN)
+    d = settings.lane_centre(settings.ego.lane) + settings.ego.lateral_offset
+    x, y, psi = point_at(line, 0.0, d)
+    speed = settings.ego.speed
+    ego = np.array([x, y, psi, speed, 0.0, speed * curvature_at(line, 0.0, d)])
+    traffic = np.zeros((len(settings.vehicles), 8))
+    for row, vehicle in zip(traffic, settings.vehicles, strict=True):
+        row[:3] = point_at(line, vehicle.position, settings.lane_centre(vehicle.lane))
+        row[SPEED], row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.speed, Vehicle.LENGTH, Vehicle.WIDTH
+        follow_lane(row, line, 0.0)
+    return Situation(line, fault_rows(settings), pack(parameters_of(settings)), ego, traffic)

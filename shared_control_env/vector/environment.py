@@ -1,0 +1,442 @@
+"""Many environments behind Gymnasium's vector interface, stepped by one compiled kernel."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from shared_control_env.core.delaunay import MAX_HOLES
+from shared_control_env.core.info import INFO
+from shared_control_env.core.observation import FEATURES
+from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, SIGNALS
+from shared_control_env.envs import config as configuration
+from shared_control_env.envs.action import AUTHORITY, DRIVER, SLOT_SPACES
+from shared_control_env.envs.scenarios import CurveEnv, TwoLaneEnv
+from shared_control_env.envs.shared_control import SharedControlEnv
+from shared_control_env.envs.situation import start_of
+from shared_control_env.vector import kernel
+from shared_control_env.vector.records import (
+    DISABLED,
+    NEXT_STEP,
+    PROGRAM,
+    SAME_STEP,
+    SOLVER,
+    WORKSPACE,
+    Batch,
+    Outputs,
+    Setup,
+)
+
+AUTORESET = {
+    AutoresetMode.NEXT_STEP: NEXT_STEP,
+    AutoresetMode.SAME_STEP: SAME_STEP,
+    AutoresetMode.DISABLED: DISABLED,
+}
+"""Gymnasium's autoreset modes and their codes in the kernel."""
+
+KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
+"""Traffic that the kernel knows."""
+
+FEWEST_PER_THREAD = 64
+"""Environments under which another thread costs more than it saves."""
+
+
+class Actions(NamedTuple):
+    """Both slots of every environment's action; zeros for a bound one.
+
+    Attributes:
+        commands: driver's commands over their limits, (N, 2).
+        alphas: authorities, (N, 1).
+    """
+
+    commands: np.ndarray
+    alphas: np.ndarray
+
+
+class Rollout(NamedTuple):
+    """Rewards and ends of a rollout.
+
+    Attributes:
+        rewards: shape (steps, N).
+        ends: whether an episode ended, shape (steps, N).
+    """
+
+    rewards: np.ndarray
+    ends: np.ndarray
+
+
+class SharedControlVectorEnv(VectorEnv):
+    """N environments of one scenario and configuration in one kernel.
+
+    Environment i gives what the single environment gives for the same actions; the functions are the same.
+
+    Args:
+        scenario: class of the single environment.
+        num_envs: N.
+        config: changes to the scenario's settings.
+        render_mode: ``rgb_array`` or ``human``; environment 0 is drawn, by the single environment's viewer.
+        limiter: bind alpha_a with the fuzzy inference; else it is the action's slot ``authority``.
+        driver: bind the driver's command with the paper's predictive driver, solved by an active-set method in
+            the kernel; else it is the action's slot ``driver``.
+        autoreset_mode: Gymnasium's mode or its name.
+        threads: how many; by default one a core, and fewer for few environments.
+
+    Raises:
+        ValueError: for wrong settings, or traffic that the kernel does not know.
+
+    The action is the open slot's Box, a dict of both, or ``Discrete(1)`` where both are bound.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
+
+    def __init__(
+        self,
+        scenario: type[SharedControlEnv],
+        num_envs: int = 1,
+        config: dict[str, Any] | None = None,
+        render_mode: str | None = None,
+        limiter: bool = True,
+        driver: bool = False,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+    ) -> None:
+        if num_envs < 1:
+            raise ValueError(f"num_envs = {num_envs} must be at least 1")
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads = {threads} must be at least 1, or None for one a core")
+        try:
+            self._mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            valid = [mode.value for mode in AutoresetMode]
+            raise ValueError(f"autoreset_mode = {autoreset_mode!r} must be one of {valid}") from None
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self._limiter, self._driver = limiter, driver
+        self._scenario, self._viewer_env = scenario, None
+        self._settings = configuration.check(configuration.merge(scenario.default_config(), config or {}))
+        self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
+        self._define_spaces()
+        wanted = threads or os.cpu_count() or 1
+        self.threads = max(1, min(wanted, num_envs // FEWEST_PER_THREAD)) if threads is None else min(wanted, num_envs)
+        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        self._works = np.zeros(self.threads, WORKSPACE)
+        self._programs = np.zeros(self.threads, PROGRAM) if driver else None
+        self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
+        self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
+        self._seeds: tuple[int | None, ...] = (None,) * num_envs
+        self._started = False
+        self._set_up()
+
+    def _define_spaces(self) -> None:
+        """Spaces of the open slots, once."""
+        bound = {DRIVER: self._driver, AUTHORITY: self._limiter}
+        rest = {slot: space for slot, space in SLOT_SPACES.items() if not bound[slot]}
+        self._open = tuple(rest)
+        single: spaces.Space = spaces.Discrete(1)
+        if len(rest) == 1:
+            (box,) = rest.values()
+            single = spaces.Box(box.low, box.high, dtype=np.float32)
+        elif rest:
+            single = spaces.Dict({slot: spaces.Box(s.low, s.high, dtype=np.float32) for slot, s in rest.items()})
+        self.single_action_space = single
+        self.single_observation_space = spaces.Box(-1.0, 1.0, (len(FEATURES),), dtype=np.float32)
+        self.action_space = batch_space(single, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+
+    def _set_up(self) -> None:
+        """Arrays and shared data from the settings."""
+        settings, n = self._settings, self.num_envs
+        if settings.other_vehicles_type != KERNEL_TRAFFIC:
+            raise ValueError(
+                f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} is not in the kernel; allowed is "
+                f"{KERNEL_TRAFFIC!r}; for others use gym.make_vec(..., vectorization_mode='sync')"
+            )
+        if len(settings.vehicles) > MAX_HOLES:
+            raise ValueError(
+                f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}"
+            )
+        self.metadata["render_fps"] = settings.policy_frequency
+        start = start_of(settings)
+        self._path = np.zeros((settings.steps + 1, 2))
+        self._setup = Setup(
+            line=start.line,
+            faults=start.faults,
+            state=start.ego,
+            traffic=start.traffic,
+            steps=settings.steps,
+            frames=settings.simulation_frequency // settings.policy_frequency,
+            dt=1.0 / settings.simulation_frequency,
+            limiter=self._limiter,
+            autoreset=AUTORESET[self._mode],
+        )
+        self._batch = Batch(
+            parameters=np.full(n, start.parameters),
+            scenes=np.zeros(n, SCENE),
+            signals=np.zeros(n, SIGNALS),
+            memories=np.zeros(n, MEMORY),
+            automations=np.zeros(n, AUTOMATION_MEMORY),
+            states=np.zeros((n, 6)),
+            traffic=np.zeros((n, *start.traffic.shape)),
+            crashed=np.zeros(n, dtype=bool),
+            ended=np.zeros(n, dtype=bool),
+        )
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """The settings of every environment."""
+        return configuration.plain(self._settings)
+
+    @property
+    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
+        """Seed of each environment, None where it was not given one."""
+        return self._seeds
+
+    @property
+    def bytes_per_environment(self) -> int:
+        """Memory of one environment's state [B]."""
+        return sum(array.nbytes for array in self._batch) // self.num_envs
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin episodes.
+
+        Args:
+            seed: of all environments: an int for seed, seed + 1, ..., or one for each.
+            options: ``{"reset_mask": mask}`` resets the environments it names alone; ``{"config": {...}}`` changes
+                the settings of all.
+
+        Returns:
+            Observations, and infos with masks as Gymnasium's.
+
+        Raises:
+            ValueError: for unknown options, a wrong mask, seeds of another number, or wrong settings.
+        """
+        options = dict(options or {})
+        mask = self._checked_mask(options.pop("reset_mask", None))
+        config = options.pop("config", None)
+        if options:
+            raise ValueError(f"options has the unknown key(s) {sorted(options)}; valid are 'config' and 'reset_mask'")
+        if config is not None:
+            if not mask.all():
+                raise ValueError(
+                    "options['config'] changes all environments; it does not go with a partial 'reset_mask'"
+                )
+            merged = configuration.merge(configuration.plain(self._settings), config)
+            self._settings, self._viewer_env = configuration.check(merged), None
+            self._set_up()
+        self._take_seeds(seed, mask)
+        out = self._outputs()
+        if self._started:  # Environments that the mask leaves out keep their last observation.
+            out.observations[:] = self._observations
+        self._advance(1, mask, mask, self._no_actions, out)
+        self._started = True
+        self._finish(out)
+        return out.observations, self._infos(out.infos, out.solver, mask)
+
+    def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Drive one time step in every environment.
+
+        Args:
+            actions: batch of the action space.
+
+        Returns:
+            Observations, rewards, terminations, truncations and infos, all new arrays.
+
+        Raises:
+            ValueError: for a malformed action, naming the environment's index; nothing has moved then. Also
+                before the first reset, and for an ended environment where autoreset is disabled.
+        """
+        checked = self._checked_actions(actions)
+        if not self._started:
+            raise ValueError("step() needs a reset() first")
+        if self._mode is AutoresetMode.DISABLED and self._batch.ended.any():
+            index = int(np.flatnonzero(self._batch.ended)[0])
+            raise ValueError(f"environment {index} has ended; reset it with options={{'reset_mask': ...}}")
+        out = self._outputs()
+        self._advance(1, self._everyone, self._nobody, checked, out)
+        self._finish(out)
+        infos = self._infos(out.infos, out.solver, np.ones(self.num_envs, dtype=bool))
+        ended = out.terminations | out.truncations
+        if self._mode is AutoresetMode.SAME_STEP and ended.any():
+            infos["final_obs"], infos["_final_obs"] = out.final_observations, ended
+            infos["final_info"] = self._infos(out.final_infos, out.final_solver, ended)
+            infos["_final_info"] = ended
+        return out.observations, out.rewards, out.terminations, out.truncations, infos
+
+    def rollout(self, steps: int) -> Rollout:
+        """Drive many time steps without returning to Python between them; both slots must be bound.
+
+        Args:
+            steps: how many, in every environment.
+
+        Raises:
+            ValueError: if a slot of the action is open.
+        """
+        if self._open:
+            raise ValueError(f"rollout() needs limiter=True and driver=True; open are {list(self._open)}")
+        if not self._started:
+            self.reset()
+        out = self._outputs()
+        result = self._advance(steps, self._everyone, self._nobody, self._no_actions, out)
+        self._finish(out)
+        return result
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Draw environment 0; in ``rgb_array`` mode a tuple of its frame."""
+        if self._viewer_env is None:
+            self._viewer_env = self._scenario(self.config, render_mode=self.render_mode)
+        batch = self._batch
+        k = int(batch.scenes[0]["k"])
+        self._viewer_env.show(batch.states[0], batch.traffic[0], batch.scenes[0], batch.signals[0], self._path[: k + 1])
+        frame = self._viewer_env.render()
+        return None if frame is None else (frame,)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the viewer and end the threads."""
+        if self._viewer_env is not None:
+            self._viewer_env.close()
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def _advance(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
+        """Run :func:`kernel.advance`, the environments split over the threads; it lets go of Python's lock."""
+        rewards = np.zeros((steps, self.num_envs))
+        ends = np.zeros((steps, self.num_envs), dtype=bool)
+
+        def work(begin: int, end: int, thread: int) -> None:
+            kernel.advance(
+                begin,
+                end,
+                steps,
+                active,
+                resets,
+                actions.commands,
+                actions.alphas,
+                self._batch,
+                self._setup,
+                out,
+                rewards,
+                ends,
+                self._works,
+                self._programs,
+                thread,
+            )
+
+        if self._pool is None:
+            work(0, self.num_envs, 0)
+        else:
+            edges = np.linspace(0, self.num_envs, self.threads + 1).astype(int).tolist()
+            for future in [self._pool.submit(work, *edges[i : i + 2], i) for i in range(self.threads)]:
+                future.result()
+        return Rollout(rewards, ends)
+
+    def _outputs(self) -> Outputs:
+        """New arrays for one step; the final ones are large and made only where they are used."""
+        n = self.num_envs
+        finals = n if self._mode is AutoresetMode.SAME_STEP else 0
+        return Outputs(
+            observations=np.zeros((n, len(FEATURES)), dtype=np.float32),
+            rewards=np.zeros(n),
+            terminations=np.zeros(n, dtype=bool),
+            truncations=np.zeros(n, dtype=bool),
+            infos=np.zeros(n, INFO),
+            solver=np.zeros(n, SOLVER),
+            final_observations=np.zeros((finals, len(FEATURES)), dtype=np.float32),
+            final_infos=np.zeros(finals, INFO),
+            final_solver=np.zeros(finals, SOLVER),
+        )
+
+    def _finish(self, out: Outputs) -> None:
+        """Keep what a later reset or picture needs."""
+        self._observations = out.observations.copy()
+        if self.render_mode is not None:
+            self._path[self._batch.scenes[0]["k"]] = self._batch.states[0, :2]
+            if self.render_mode == "human":
+                self.render()
+
+    def _infos(self, infos: np.ndarray, solver: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
+        """Records as Gymnasium's nested dict of arrays with their masks."""
+        values = _batched(infos, mask)
+        if self._driver:
+            values["driver"], values["_driver"] = _batched(solver, mask), mask
+        return values
+
+    def _checked_actions(self, actions: Any) -> Actions:
+        """Commands and authorities, with zeros for what is bound."""
+        given = actions if len(self._open) == 2 else dict.fromkeys(self._open, actions)
+        if len(self._open) == 2 and (not isinstance(actions, dict) or set(actions) != set(self._open)):
+            raise ValueError(
+                f"actions must be a dict with the keys {sorted(self._open)}, each of shape ({self.num_envs}, n)"
+            )
+        values = {DRIVER: self._no_actions.commands, AUTHORITY: self._no_actions.alphas}
+        for slot in self._open:
+            array = np.array(given[slot], dtype=np.float64)
+            size = SLOT_SPACES[slot].shape[0]
+            if array.shape != (self.num_envs, size):
+                raise ValueError(f"actions[{slot!r}] has shape {array.shape}; it must be ({self.num_envs}, {size})")
+            finite = np.isfinite(array).all(axis=1)
+            if not finite.all():
+                index = int(np.flatnonzero(~finite)[0])
+                low, high = SLOT_SPACES[slot].low[0], SLOT_SPACES[slot].high[0]
+                raise ValueError(
+                    f"action of environment {index}, slot {slot!r}, is {array[index]}; "
+                    f"it must be finite, in [{low:g}, {high:g}]"
+                )
+            values[slot] = array
+        return Actions(values[DRIVER], values[AUTHORITY])
+
+    def _checked_mask(self, mask: Any) -> np.ndarray:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=bool)
+        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise ValueError(f"options['reset_mask'] = {mask!r} must be a bool array of shape ({self.num_envs},)")
+        if not mask.any():
+            raise ValueError("options['reset_mask'] names no environment; at least one entry must be True")
+        if not self._started and not mask.all():
+            raise ValueError("options['reset_mask'] must name every environment at the first reset")
+        return mask
+
+    def _take_seeds(self, seed: int | Sequence[int | None] | None, mask: np.ndarray) -> None:
+        """Seed of each environment. The scenarios of version 0 draw nothing, so that none is used yet."""
+        if seed is None:
+            return
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else list(seed)
+        if len(seeds) != self.num_envs:
+            raise ValueError(
+                f"seed has {len(seeds)} entries; it must be an int or have one for each of {self.num_envs}"
+            )
+        for value in seeds:
+            if value is not None:
+                seeding.np_random(int(value))  # raises for a seed that Gymnasium would refuse
+        self._seeds = tuple(new if chosen else old for new, old, chosen in zip(seeds, self._seeds, mask, strict=True))
+
+
+def _batched(records: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
+    """An array of records as a nested dict of arrays, each with the mask of the environments that have it."""
+    values: dict[str, Any] = {}
+    for name in records.dtype.names or ():
+        field = records[name]
+        values[name] = _batched(field, mask) if field.dtype.names else field
+        values[f"_{name}"] = mask
+    return values
+
+
+def two_lane(num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
+    """``SharedControl/TwoLane-v0``, N times; see :class:`SharedControlVectorEnv`."""
+    return SharedControlVectorEnv(TwoLaneEnv, num_envs, **options)
+
+
+def curve(num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
+    """``SharedControl/Curve-v0``, N times; see :class:`SharedControlVectorEnv`."""
+    return SharedControlVectorEnv(CurveEnv, num_envs, **options)

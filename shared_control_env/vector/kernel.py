@@ -1,0 +1,270 @@
+"""The kernel that steps many environments, composed of the core's functions that the single one calls."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared_control_env.core import active_set_qp, closed_loop, delaunay, fuzzy
+from shared_control_env.core.collision import overlap
+from shared_control_env.core.driver_qp import build_program
+from shared_control_env.core.dynamics import plant_step
+from shared_control_env.core.info import note_outcome, note_signals
+from shared_control_env.core.jit import jit, jit_inlined
+from shared_control_env.core.observation import observe
+from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, Record, X, Y
+from shared_control_env.core.safe_area import search_triangles, whole_region
+from shared_control_env.core.scene import holes_in_region, perceive
+from shared_control_env.core.traffic import follow_lane
+from shared_control_env.vector.records import NEXT_STEP, SAME_STEP, Batch, Outputs, Setup
+
+
+@jit_inlined
+def find_area(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, work: Record) -> None:
+    """Safe area of a scene; without a vehicle inside, the driving region itself is exact."""
+    count = holes_in_region(traffic, line, scene.region, work.corners)
+    if count == 0:
+        whole_region(scene.region, scene.area)
+        return
+    n = max(0, delaunay.triangulate(scene.region, work.corners, count, work.triangles))
+    triangles = work.triangles.triangles[:n]
+    search_triangles(triangles, scene.region[0], scene.region[1], scene.z[1], p.vehicle.width, scene.area)
+
+
+@jit_inlined
+def perceive_and_plan(i: int, k: int, batch: Batch, setup: Setup, work: Record) -> None:
+    """Perceive environment i's scene at time step k, let the automation decide, degrade it, assess the risk."""
+    p, scene, signals = batch.parameters[i], batch.scenes[i], batch.signals[i]
+    perceive(k, batch.states[i], batch.traffic[i], setup.line, p, scene)
+    find_area(scene, batch.traffic[i], setup.line, p, work)
+    automation = batch.automations[i]
+    status, iterations, residual = closed_loop.automate(scene, p, automation, work.solver)
+    signals.status, signals.iterations, signals.residual = status, iterations, residual
+    signals.u_a_des[0], signals.u_a_des[1] = automation.u_a_des[0], automation.u_a_des[1]
+    closed_loop.monitor(scene, batch.traffic[i], setup.line, setup.faults, p, signals)
+
+
+@jit_inlined
+def drive_by_program(
+    scene: Record, p: Parameters, memory: Record, work: Record, program: Record, report: Record
+) -> None:
+    """The predictive driver's command (Eq. 15) by the active-set method, left in ``work.command``.
+
+    When the solver fails the last command is held and the failure counted.
+    """
+    g = program
+    build_program(scene, memory.u_h_des, p, work.solver, g.P, g.q, g.A, g.low, g.high)
+    n = 2 * p.driver.H_c + 1
+    m = 2 * p.driver.H_p + n
+    status, iterations, primal, dual = active_set_qp.solve_qp(
+        n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set
+    )
+    if status == active_set_qp.SOLVED:
+        work.command[0] = min(max(g.x[0], -1.0), 1.0) * p.limits.a_max
+        work.command[1] = min(max(g.x[1], -1.0), 1.0) * p.limits.delta_max
+    else:
+        work.command[0], work.command[1] = memory.u_h_des[0], memory.u_h_des[1]
+        memory.driver_failures += 1
+    report.status, report.iterations = status, iterations
+    report.primal_residual, report.dual_residual = primal, dual
+
+
+@jit
+def decide(
+    i: int,
+    commands: np.ndarray,
+    alphas: np.ndarray,
+    batch: Batch,
+    setup: Setup,
+    work: Record,
+    programs: np.ndarray | None,
+    thread: int,
+    report: Record,
+) -> float:
+    """Bring both slots of the action together: the driver's command in ``work.command``, and alpha_a, returned.
+
+    Args:
+        i: the environment.
+        commands: driver's commands over their limits, (N, 2); not read where the driver is bound.
+        alphas: authorities, (N, 1); not read where the limiter is bound.
+        batch, setup, work: see their types.
+        programs: records of :data:`records.PROGRAM`, one a thread; None leaves the driver's solver uncompiled.
+        thread: which of them is ours.
+        report: record of :data:`records.SOLVER`, written.
+    """
+    p, scene, memory = batch.parameters[i], batch.scenes[i], batch.memories[i]
+    if programs is None:
+        work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * p.limits.a_max
+        work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * p.limits.delta_max
+    else:
+        drive_by_program(scene, p, memory, work, programs[thread], report)
+        report.failures = memory.driver_failures
+    if setup.limiter:
+        return fuzzy.authority(batch.signals[i].r_x, batch.signals[i].r_y, p.authority.operators)
+    return min(max(alphas[i, 0], 0.0), 1.0)
+
+
+@jit_inlined
+def simulate(i: int, batch: Batch, setup: Setup, work: Record) -> None:
+    """Move environment i's vehicles through one decision's simulation steps and check the ego's collisions."""
+    p, u, state, traffic, row = batch.parameters[i], batch.signals[i].u, batch.states[i], batch.traffic[i], work.row
+    row[BODY_LENGTH], row[BODY_WIDTH] = p.vehicle.length, p.vehicle.width
+    for _ in range(setup.frames):
+        plant_step(state, u[0], u[1], setup.dt, p.vehicle, work.plant)
+        row[X], row[Y], row[HEADING] = state[0], state[1], state[2]
+        for j in range(traffic.shape[0]):
+            follow_lane(traffic[j], setup.line, setup.dt)
+        for j in range(traffic.shape[0]):
+            if overlap(row, traffic[j]):
+                batch.crashed[i] = True
+
+
+@jit_inlined
+def apply(
+    i: int,
+    commands: np.ndarray,
+    alphas: np.ndarray,
+    batch: Batch,
+    setup: Setup,
+    out: Outputs,
+    work: Record,
+    programs: np.ndarray | None,
+    thread: int,
+) -> None:
+    """First half of a decision of environment i: both slots, the loop's commands, the vehicles' motion."""
+    scene, signals, memory = batch.scenes[i], batch.signals[i], batch.memories[i]
+    alpha_a = decide(i, commands, alphas, batch, setup, work, programs, thread, out.solver[i])
+    closed_loop.blend(work.command, alpha_a, batch.parameters[i], memory, signals)
+    note_signals(scene, signals, setup.faults, batch.automations[i].failures, out.infos[i])
+    simulate(i, batch, setup, work)
+
+
+@jit_inlined
+def restore(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
+    """Put environment i back to its start."""
+    for n in range(6):
+        batch.states[i, n] = setup.state[n]
+    for j in range(setup.traffic.shape[0]):
+        for n in range(8):
+            batch.traffic[i, j, n] = setup.traffic[j, n]
+    batch.crashed[i] = batch.ended[i] = False
+    closed_loop.clear_memory(batch.memories[i])
+    closed_loop.clear_automation(batch.automations[i])
+    closed_loop.clear_signals(batch.signals[i])
+    report = out.solver[i]
+    report.status, report.iterations, report.failures = 0, 0, 0
+    report.primal_residual, report.dual_residual = 0.0, 0.0
+
+
+@jit_inlined
+def note_start(i: int, batch: Batch, setup: Setup, out: Outputs, work: Record) -> None:
+    """Info of a reset: the signals planned for k = 0, and nothing that came of them yet."""
+    scene, info = batch.scenes[i], out.infos[i]
+    note_signals(scene, batch.signals[i], setup.faults, batch.automations[i].failures, info)
+    for n in range(work.terms.shape[0]):
+        work.terms[n] = 0.0
+    on_road = closed_loop.is_on_road(scene, batch.parameters[i])
+    note_outcome(batch.states[i, 3], False, on_road, batch.memories[i], work.terms, info)
+    out.rewards[i] = 0.0
+    out.terminations[i] = out.truncations[i] = False
+
+
+@jit_inlined
+def advance_one(
+    i: int,
+    resetting: bool,
+    commands: np.ndarray,
+    alphas: np.ndarray,
+    batch: Batch,
+    setup: Setup,
+    out: Outputs,
+    work: Record,
+    programs: np.ndarray | None,
+    thread: int,
+) -> None:
+    """Step environment i, or begin its next episode; the order is that of :class:`SharedControlEnv`."""
+    scene, signals, memory, p = batch.scenes[i], batch.signals[i], batch.memories[i], batch.parameters[i]
+    previous_s, last_a = scene.z[0], memory.u[0]
+    if resetting:
+        restore(i, batch, setup, out)
+        scene.k = -1
+    else:
+        apply(i, commands, alphas, batch, setup, out, work, programs, thread)
+    perceive_and_plan(i, scene.k + 1, batch, setup, work)
+    if resetting:
+        note_start(i, batch, setup, out, work)
+    else:
+        out.rewards[i], out.terminations[i] = closed_loop.conclude(
+            previous_s, last_a, batch.crashed[i], scene, signals, p, memory, work.terms, out.infos[i]
+        )
+        out.truncations[i] = scene.k >= setup.steps
+    observe(scene, memory, setup.line, p, out.observations[i])
+
+
+@jit_inlined
+def keep_final(i: int, out: Outputs) -> None:
+    """Keep what an episode ended with, before environment i is reset in the same step."""
+    for n in range(out.observations.shape[1]):
+        out.final_observations[i, n] = out.observations[i, n]
+    out.final_infos[i] = out.infos[i]
+    out.final_solver[i] = out.solver[i]
+
+
+@jit
+def advance(
+    begin: int,
+    end: int,
+    steps: int,
+    active: np.ndarray,
+    resets: np.ndarray,
+    commands: np.ndarray,
+    alphas: np.ndarray,
+    batch: Batch,
+    setup: Setup,
+    out: Outputs,
+    rewards: np.ndarray,
+    ends: np.ndarray,
+    works: np.ndarray,
+    programs: np.ndarray | None,
+    thread: int,
+) -> None:
+    """Advance the environments from begin to end, each by some steps in a row, resetting as the autoreset mode says.
+
+    Args:
+        begin, end: range of environments.
+        steps: how many time steps; the actions are held or bound.
+        active: environments that are advanced at all, (N,).
+        resets: environments whose first step is a reset, (N,).
+        commands: driver's commands over their limits, (N, 2).
+        alphas: authorities, (N, 1).
+        batch, setup: see their types.
+        out: of the last step.
+        rewards: of every step, written, (steps, N).
+        ends: whether an episode ended at each step, written, (steps, N).
+        works: records of :data:`records.WORKSPACE`, one a thread.
+        programs: records of :data:`records.PROGRAM`, one a thread, where the driver is bound; else None.
+        thread: which of them is ours.
+    """
+    work = works[thread]
+    for i in range(begin, end):
+        if not active[i]:
+            continue
+        k = 0
+        resetting = resets[i] or (setup.autoreset == NEXT_STEP and batch.ended[i])
+        same_step = terminated = truncated = False
+        while k < steps:
+            advance_one(i, resetting, commands, alphas, batch, setup, out, work, programs, thread)
+            if same_step:
+                out.rewards[i], out.terminations[i], out.truncations[i] = rewards[k, i], terminated, truncated
+            else:
+                rewards[k, i] = out.rewards[i]
+                terminated, truncated = out.terminations[i], out.truncations[i]
+                ends[k, i] = terminated or truncated
+            same_step = not same_step and ends[k, i] and setup.autoreset == SAME_STEP
+            if same_step:
+                keep_final(i, out)
+                resetting = True
+                continue
+            batch.ended[i] = ends[k, i] and setup.autoreset != SAME_STEP
+            resetting = setup.autoreset == NEXT_STEP and batch.ended[i]
+            k += 1

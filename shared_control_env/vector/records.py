@@ -1,0 +1,130 @@
+"""Arrays of many environments, and the scratch of one thread."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shared_control_env.core import active_set_qp, condensing, delaunay
+from shared_control_env.core.active_set_qp import MAX_ROWS, MAX_VARIABLES
+
+NEXT_STEP, SAME_STEP, DISABLED = range(3)
+"""Codes of Gymnasium's autoreset modes."""
+
+
+class Batch(NamedTuple):
+    """State of N environments, one entry each.
+
+    Attributes:
+        parameters: records of :class:`core.parameters.Parameters`, (N,).
+        scenes: of :data:`records.SCENE`, (N,).
+        signals: of :data:`records.SIGNALS`, (N,).
+        memories: of :data:`records.MEMORY`, (N,).
+        automations: of :data:`records.AUTOMATION_MEMORY`, (N,).
+        states: ego ``[x, y, psi, v_x, v_y, r]``, (N, 6).
+        traffic: other vehicles, (N, M, 8).
+        crashed: whether the ego has collided, (N,).
+        ended: whether the episode has ended and awaits its reset, (N,).
+    """
+
+    parameters: np.ndarray
+    scenes: np.ndarray
+    signals: np.ndarray
+    memories: np.ndarray
+    automations: np.ndarray
+    states: np.ndarray
+    traffic: np.ndarray
+    crashed: np.ndarray
+    ended: np.ndarray
+
+
+class Setup(NamedTuple):
+    """What all environments share.
+
+    Attributes:
+        line: reference line of the road, (n, 6).
+        faults: degradations, (m, 4).
+        state: ego at the start, (6,).
+        traffic: other vehicles at the start, (M, 8).
+        steps: length of an episode in decisions.
+        frames: simulation steps of one decision.
+        dt: of a simulation step [s].
+        limiter: whether the fuzzy inference decides alpha_a.
+        autoreset: :data:`NEXT_STEP`, :data:`SAME_STEP` or :data:`DISABLED`.
+    """
+
+    line: np.ndarray
+    faults: np.ndarray
+    state: np.ndarray
+    traffic: np.ndarray
+    steps: int
+    frames: int
+    dt: float
+    limiter: bool
+    autoreset: int
+
+
+class Outputs(NamedTuple):
+    """What a step gives, one entry an environment.
+
+    Attributes:
+        observations: (N, 25), float32.
+        rewards: (N,).
+        terminations, truncations: (N,).
+        infos: records of :data:`info.INFO`, (N,).
+        solver: records of :data:`SOLVER`, the driver's, (N,).
+        final_observations, final_infos, final_solver: those at the end of an episode that was reset in the same step.
+    """
+
+    observations: np.ndarray
+    rewards: np.ndarray
+    terminations: np.ndarray
+    truncations: np.ndarray
+    infos: np.ndarray
+    solver: np.ndarray
+    final_observations: np.ndarray
+    final_infos: np.ndarray
+    final_solver: np.ndarray
+
+
+SOLVER = np.dtype(
+    [
+        ("status", np.int64),  # active_set_qp.SOLVED, ITERATION_LIMIT or FAILED
+        ("iterations", np.int64),
+        ("primal_residual", np.float64),
+        ("dual_residual", np.float64),
+        ("failures", np.int64),  # steps so far at which the last command was held
+    ],
+    align=True,
+)
+"""Report of the driver's solver, as ``info["driver"]``."""
+
+WORKSPACE = np.dtype(
+    [
+        ("solver", condensing.WORKSPACE),
+        ("triangles", delaunay.WORKSPACE),
+        ("corners", np.float64, (delaunay.MAX_HOLES, 4, 2)),  # vehicles in the driving region
+        ("row", np.float64, (8,)),  # the ego as a row of traffic
+        ("plant", np.float64, (2, 6)),
+        ("terms", np.float64, (7,)),  # of the reward
+        ("command", np.float64, (2,)),  # the driver's
+    ],
+    align=True,
+)
+"""Scratch of one thread."""
+
+PROGRAM = np.dtype(
+    [
+        ("active_set", active_set_qp.WORKSPACE),
+        ("P", np.float64, (MAX_VARIABLES, MAX_VARIABLES)),
+        ("q", np.float64, (MAX_VARIABLES,)),
+        ("A", np.float64, (MAX_ROWS, MAX_VARIABLES)),
+        ("low", np.float64, (MAX_ROWS,)),
+        ("high", np.float64, (MAX_ROWS,)),
+        ("x", np.float64, (MAX_VARIABLES,)),
+        ("multipliers", np.float64, (MAX_ROWS,)),
+    ],
+    align=True,
+)
+"""The driver's quadratic program and its solver's scratch, of one thread."""

@@ -1,0 +1,76 @@
+import gymnasium as gym
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the extra 'train'")
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+
+import shared_control_env  # noqa: F401
+from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
+
+TWO_LANE = "SharedControl/TwoLane-v0"
+CONFIG = {"duration": 1.0}
+
+
+def make(n=4, **options):
+    return StableBaselinesVecEnv(
+        gym.make_vec(TWO_LANE, num_envs=n, autoreset_mode="same_step", config=CONFIG, **options)
+    )
+
+
+def test_same_as_stable_baselines_own_over_the_single_environment():
+    ours, theirs = make(), DummyVecEnv([lambda: gym.make(TWO_LANE, config=CONFIG)] * 4)
+    ours.seed(0)
+    theirs.seed(0)
+    np.testing.assert_allclose(ours.reset(), theirs.reset(), atol=1e-9)
+    rng = np.random.default_rng(0)
+    ended = 0
+    for _ in range(50):
+        actions = (0.1 * rng.normal(size=(4, 2))).astype(np.float32)
+        a, b = ours.step(actions), theirs.step(actions)
+        for x, y in zip(a[:3], b[:3], strict=True):
+            np.testing.assert_allclose(x, y, atol=1e-6)
+        for done, x, y in zip(a[2], a[3], b[3], strict=True):
+            if done:
+                ended += 1
+                np.testing.assert_allclose(x["terminal_observation"], y["terminal_observation"], atol=1e-9)
+                assert x["TimeLimit.truncated"] == y["TimeLimit.truncated"]
+    assert ended >= 8
+
+
+def test_monitor_counts_episodes():
+    env = VecMonitor(make())
+    env.reset()
+    lengths = []
+    for _ in range(45):
+        infos = env.step(np.zeros((4, 2), dtype=np.float32))[3]
+        lengths += [info["episode"]["l"] for info in infos if "episode" in info]
+    assert lengths == [20] * 8
+
+
+def test_ppo_learns_on_it_and_repeats():
+    weights = []
+    for _ in range(2):
+        model = PPO("MlpPolicy", VecMonitor(make()), n_steps=32, batch_size=64, seed=1, device="cpu")
+        model.learn(256)
+        weights.append(model.policy.state_dict()["action_net.weight"].numpy().copy())
+    np.testing.assert_array_equal(*weights)
+
+
+def test_refused():
+    with pytest.raises(ValueError, match="same_step"):
+        StableBaselinesVecEnv(gym.make_vec(TWO_LANE, num_envs=2))
+    with pytest.raises(ValueError, match="SharedControlVectorEnv"):
+        StableBaselinesVecEnv(gym.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync"))
+    with pytest.raises(ValueError, match="config"):
+        make().set_attr("config", {})
+
+
+def test_images_and_attributes():
+    env = make(3, render_mode="rgb_array")
+    env.reset()
+    assert env.get_images()[0].ndim == 3
+    assert env.get_attr("threads") == [env.env.threads] * 3
+    assert env.env_is_wrapped(gym.Wrapper) == [False] * 3

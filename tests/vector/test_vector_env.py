@@ -1,0 +1,326 @@
+"""The vectorised environment gives what the single one gives, and follows Gymnasium's vector interface."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+import shared_control_env  # noqa: F401
+from shared_control_env.core.authority import LAWS
+from shared_control_env.envs import TwoLaneEnv
+from shared_control_env.registration import ENVIRONMENTS
+from shared_control_env.vector import SharedControlVectorEnv
+from shared_control_env.wrappers import DriverModel
+
+IDS = list(ENVIRONMENTS)
+TWO_LANE = "SharedControl/TwoLane-v0"
+BIAS = {"onset": 0.2, "ramp": 0.4}
+FAULTS = {
+    "none": [],
+    "steering": [{"channel": "steering", "size": 0.2, **BIAS}],
+    "acceleration": [{"channel": "acceleration", "size": 3.0, **BIAS}],
+    "both": [{"channel": "steering", "size": -0.1, **BIAS}, {"channel": "acceleration", "size": -2.0, **BIAS}],
+}
+
+
+def flat(info, prefix=""):
+    """Nested info as {path: value}, masks left out."""
+    values = {}
+    for key, value in info.items():
+        if not key.startswith("_"):
+            path = f"{prefix}{key}"
+            values.update(flat(value, f"{path}/") if isinstance(value, dict) else {path: value})
+    return values
+
+
+def assert_same_info(infos, single, index):
+    many = flat(infos)
+    one = flat(single)
+    assert many.keys() == one.keys()
+    for path, value in one.items():
+        np.testing.assert_allclose(many[path][index], value, rtol=0.0, atol=1e-9, err_msg=path)
+
+
+def compare(single, many, policy, seed=0, index=2):
+    """Whole episode of the single environment against environment ``index`` of the vectorised one."""
+    rng = np.random.default_rng(seed)
+    observation, info = single.reset(seed=seed)
+    observations, infos = many.reset(seed=seed)
+    np.testing.assert_allclose(observations[index], observation, atol=1e-9)
+    assert_same_info(infos, info, index)
+    steps, done = 0, False
+    while not done:
+        actions = policy(rng, many)
+        observation, reward, terminated, truncated, info = single.step(actions[index])
+        observations, rewards, terminations, truncations, infos = many.step(actions)
+        np.testing.assert_allclose(observations[index], observation, rtol=0.0, atol=1e-9)
+        assert rewards[index] == pytest.approx(reward, abs=1e-9)
+        assert (terminations[index], truncations[index]) == (terminated, truncated)
+        assert_same_info(infos, info, index)
+        steps, done = steps + 1, terminated or truncated
+    return steps
+
+
+def random_driver(rng, many):
+    return (0.15 * rng.normal(size=(many.num_envs, 2))).clip(-1, 1).astype(np.float32)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("name", IDS)
+def test_same_as_the_single_environment(name, fault, law):
+    config = {"faults": FAULTS[fault], "authority": {"law": law}, "duration": 6.0}
+    single = gym.make(name, config=config)
+    many = gym.make_vec(name, num_envs=3, config=config)
+    assert compare(single, many, random_driver, seed=len(fault) + len(law)) > 10
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_same_over_a_full_episode_at_finer_simulation_steps(name):
+    config = {"faults": FAULTS["steering"], "simulation_frequency": 60, "longitudinal_risk": {"preset": "paper"}}
+    gentle = lambda rng, many: (0.02 * rng.normal(size=(many.num_envs, 2))).astype(np.float32)
+    assert compare(gym.make(name, config=config), gym.make_vec(name, num_envs=3, config=config), gentle) > 40
+
+
+def test_same_where_vehicles_reach_into_the_driving_region():
+    # Slow vehicles whose lane lies half across the edge: the region has holes, so that the triangles count.
+    vehicles = [{"lane": 1, "position": s, "speed": 3.0} for s in (15.0, 28.0, 45.0)]
+    config = {"vehicles": vehicles, "faults": FAULTS["steering"], "duration": 5.0}
+    single = gym.make(TWO_LANE, config=config)
+    many = gym.make_vec(TWO_LANE, num_envs=3, config=config)
+    start = many.unwrapped._setup.traffic
+    start[:, 1] -= (1.2, 1.6, 0.9)
+    start[:, 2] += (0.05, -0.1, 0.0)
+    place = single.unwrapped._place_vehicles
+
+    def place_across(situation):
+        place(situation._replace(traffic=start))
+        for vehicle, row in zip(single.unwrapped.road.vehicles[1:], start, strict=True):
+            vehicle.array[:] = row
+
+    single.unwrapped._place_vehicles = place_across
+    gentle = lambda rng, many: (0.03 * rng.normal(size=(many.num_envs, 2))).astype(np.float32)
+    assert compare(single, many, gentle) > 15
+    outline = many.step(np.zeros((3, 2)))[4]["safe_area_upper"]
+    assert np.ptp(outline[0, :, 1]) > 0.1  # the boundary does bend around a vehicle
+
+
+def test_same_for_an_allocator():
+    single = DriverModel(TwoLaneEnv({"authority": {"law": "proportional"}}))
+    many = gym.make_vec(TWO_LANE, num_envs=3, config={"authority": {"law": "proportional"}}, limiter=False, driver=True)
+    assert many.single_action_space == gym.spaces.Box(0.0, 1.0, (1,), np.float32)
+    single.reset(seed=0)
+    many.reset(seed=0)
+    for _ in range(60):
+        alpha = np.full((3, 1), 0.3, dtype=np.float32)
+        info = single.step(alpha[0])[4]
+        infos = many.step(alpha)[4]
+        assert infos["alpha_a"][1] == info["alpha_a"]
+        # The drivers' solvers differ: OSQP to 1e-5, the active set to rounding.
+        np.testing.assert_allclose(infos["u_h_des"][1], info["u_h_des"], atol=2e-3)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_driver_in_the_kernel_is_the_predictive_driver(name):
+    single = DriverModel(gym.make(name))
+    many = gym.make_vec(name, num_envs=2, driver=True)
+    single.reset(seed=0)
+    many.reset(seed=0)
+    done = False
+    while not done:
+        _, _, terminated, truncated, info = single.step(0)
+        infos = many.step(None)[4]
+        np.testing.assert_allclose(infos["z"][0], info["z"], atol=2e-3)
+        assert infos["driver"]["status"][0] == 0
+        assert infos["driver"]["primal_residual"][0] < 1e-8
+        assert infos["driver"]["dual_residual"][0] < 1e-6
+        done = terminated or truncated
+
+
+def test_a_rollout_is_the_steps_in_one_call():
+    config = {"duration": 1.5}
+    stepped = gym.make_vec(TWO_LANE, num_envs=3, driver=True, config=config)
+    rolled = gym.make_vec(TWO_LANE, num_envs=3, driver=True, config=config)
+    for env in (stepped, rolled):
+        env.reset(seed=0)
+    rewards, ends = [], []
+    for _ in range(70):
+        _, reward, terminated, truncated, _ = stepped.step(None)
+        rewards.append(reward)
+        ends.append(terminated | truncated)
+    result = rolled.rollout(70)
+    np.testing.assert_array_equal(result.rewards, rewards)
+    np.testing.assert_array_equal(result.ends, ends)
+    np.testing.assert_array_equal(stepped.step(None)[0], rolled.step(None)[0])
+
+
+def test_threads_change_nothing():
+    results = []
+    for threads in (1, 2, 3):
+        env = gym.make_vec(TWO_LANE, num_envs=7, threads=threads)
+        env.reset(seed=0)
+        rng = np.random.default_rng(0)
+        results.append([env.step(random_driver(rng, env))[:4] for _ in range(40)])
+        env.close()
+    for other in results[1:]:
+        for a, b in zip(results[0], other, strict=True):
+            for x, y in zip(a, b, strict=True):
+                np.testing.assert_array_equal(x, y)
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_autoreset_follows_gymnasiums_own(mode):
+    config = {"duration": 0.3}
+    ours = gym.make_vec(TWO_LANE, num_envs=2, config=config, autoreset_mode=mode)
+    theirs = SyncVectorEnv([lambda: gym.make(TWO_LANE, config=config)] * 2, autoreset_mode=mode)
+    assert ours.metadata["autoreset_mode"] is mode
+    rng = np.random.default_rng(0)
+    pairs = [(ours.reset(seed=3), theirs.reset(seed=3))]
+    for _ in range(20):
+        actions = random_driver(rng, ours)
+        pairs.append((ours.step(actions), theirs.step(actions)))
+        if mode is AutoresetMode.DISABLED and pairs[-1][0][3].all():
+            with pytest.raises(ValueError, match="environment 0 has ended"):
+                ours.step(actions)
+            mask = np.array([True, True])
+            pairs.append((ours.reset(options={"reset_mask": mask}), theirs.reset(options={"reset_mask": mask.copy()})))
+    for a, b in pairs:
+        for x, y in zip(a[:-1], b[:-1], strict=True):
+            np.testing.assert_allclose(x, y, atol=1e-9)
+        finals = {key for key in b[-1] if key.startswith(("final", "_final"))}
+        assert finals == {key for key in a[-1] if key.startswith(("final", "_final"))}
+        for i in range(2):
+            assert_same_info(
+                {k: v for k, v in a[-1].items() if not k.startswith("final")},
+                {k: at(v, i) for k, v in b[-1].items() if not k.startswith(("final", "_"))},
+                i,
+            )
+            if finals and a[-1]["_final_obs"][i]:
+                np.testing.assert_allclose(a[-1]["final_obs"][i], b[-1]["final_obs"][i], atol=1e-9)
+                assert a[-1]["final_info"]["t"][i] == b[-1]["final_info"]["t"][i]
+
+
+def at(value, index):
+    """Environment ``index`` of a nested info."""
+    if isinstance(value, dict):
+        return {k: at(v, index) for k, v in value.items() if not k.startswith("_")}
+    return value[index]
+
+
+def test_reset_mask_touches_the_named_environments_alone():
+    env = gym.make_vec(TWO_LANE, num_envs=3)
+    env.reset(seed=0)
+    for _ in range(10):
+        observations = env.step(np.full((3, 2), 0.05))[0]
+    mask = np.array([False, True, False])
+    reset, infos = env.reset(options={"reset_mask": mask})
+    np.testing.assert_array_equal(reset[[0, 2]], observations[[0, 2]])
+    assert not np.array_equal(reset[1], observations[1])
+    np.testing.assert_array_equal(infos["_t"], mask)
+    infos = env.step(np.full((3, 2), 0.05))[4]
+    np.testing.assert_array_equal(infos["k"], [10, 0, 10])
+
+
+def test_spaces_seeds_and_infos():
+    env = gym.make_vec(TWO_LANE, num_envs=4)
+    assert env.observation_space.shape == (4, 25)
+    env.action_space.seed(1)
+    first = env.action_space.sample()
+    env.action_space.seed(1)
+    observations, infos = env.reset(seed=[5, 6, 7, None])
+    np.testing.assert_array_equal(env.action_space.sample(), first)
+    assert env.observation_space.contains(observations)
+    assert env.unwrapped.np_random_seed == (5, 6, 7, None)
+    for path, value in flat(infos).items():
+        assert value.dtype != object, path
+        assert len(value) == 4
+    kept = {path: value.copy() for path, value in flat(infos).items()}
+    env.step(first)
+    for path, value in flat(infos).items():
+        np.testing.assert_array_equal(value, kept[path])
+
+
+def test_options_change_the_settings_of_all():
+    env = gym.make_vec(TWO_LANE, num_envs=2)
+    env.reset(seed=0)
+    env.reset(options={"config": {"ego": {"speed": 9.0}}})
+    assert (env.step(np.zeros((2, 2)))[4]["state"][:, 3] == 9.0).all()
+
+
+def test_spec_round_trips():
+    env = gym.make_vec(TWO_LANE, num_envs=2, config={"duration": 1.0})
+    again = gym.make_vec(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    assert again.num_envs == 2
+    assert again.unwrapped.config == env.unwrapped.config
+
+
+def test_renders_environment_0_as_the_single_one():
+    config = {"faults": FAULTS["steering"]}
+    single = gym.make(TWO_LANE, config=config, render_mode="rgb_array")
+    many = gym.make_vec(TWO_LANE, num_envs=3, config=config, render_mode="rgb_array")
+    single.reset(seed=0)
+    many.reset(seed=0)
+    for _ in range(30):
+        single.step(np.zeros(2, dtype=np.float32))
+        many.step(np.zeros((3, 2), dtype=np.float32))
+    (frame,) = many.render()
+    np.testing.assert_array_equal(frame, single.render())
+    many.close()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_bad_action_names_its_environment_and_moves_nothing(bad):
+    env = gym.make_vec(TWO_LANE, num_envs=5)
+    env.reset(seed=0)
+    actions = np.zeros((5, 2))
+    env.step(actions)
+    before = [array.copy() for array in env.unwrapped._batch]
+    actions[3, 1] = bad
+    with pytest.raises(ValueError, match="environment 3"):
+        env.step(actions)
+    for a, b in zip(before, env.unwrapped._batch, strict=True):
+        assert (a == b).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda env: env.step(np.zeros((5, 2))), r"shape \(5, 2\); it must be \(3, 2\)"),
+        (lambda env: env.reset(seed=[1, 2]), "seed has 2 entries"),
+        (lambda env: env.reset(options={"maks": 1}), "unknown key"),
+        (lambda env: env.reset(options={"reset_mask": [True] * 3}), "bool array"),
+        (lambda env: env.reset(options={"reset_mask": np.zeros(3, dtype=bool)}), "names no environment"),
+        (lambda env: env.reset(options={"config": {"duratoin": 1.0}}), "duration"),
+        (lambda env: env.unwrapped.rollout(3), "open are"),
+    ],
+)
+def test_refused(call, message):
+    env = gym.make_vec(TWO_LANE, num_envs=3)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=message):
+        call(env)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"num_envs": 0}, "num_envs = 0"),
+        ({"threads": 0}, "threads = 0"),
+        ({"autoreset_mode": "sometimes"}, "must be one of"),
+        ({"config": {"other_vehicles_type": "highway_env.vehicle.behavior.IDMVehicle"}}, "not in the kernel"),
+        ({"config": {"vehicles": [{"lane": 1, "position": 9.0 * i, "speed": 9.0} for i in range(9)]}}, "0 to 8"),
+        ({"config": {"authority": {"law": "papr"}}}, "'paper'"),
+    ],
+)
+def test_wrong_construction(options, message):
+    with pytest.raises(ValueError, match=message):
+        SharedControlVectorEnv(TwoLaneEnv, **options)
+
+
+def test_stepping_before_a_reset():
+    with pytest.raises(ValueError, match="reset"):
+        gym.make_vec(TWO_LANE, num_envs=2).step(np.zeros((2, 2)))
+
+
+def test_memory_of_an_environment():
+    assert gym.make_vec(TWO_LANE, num_envs=64).unwrapped.bytes_per_environment <= 4096

@@ -15,7 +15,6 @@ from shared_control_env.core.jit import jit
 from shared_control_env.core.lateral_risk import continuous_field
 from shared_control_env.core.parameters import Limits, Parameters
 from shared_control_env.core.records import Record
-from shared_control_env.core.safe_area import boundary_distance
 
 CONVERGED, ITERATION_LIMIT, FAILED = 0, 1, 2
 """Statuses: stationary to :data:`TOLERANCE`, stopped before that, or not a finite number."""
@@ -55,8 +54,7 @@ def cost(U: np.ndarray, scene: Record, p: Parameters, work: Record) -> float:
     for i in range(w.H_p):
         j = min(i, w.H_c - 1)
         implicit_step(z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next)
-        r_b = boundary_distance(scene.area, z_next[S], z_next[Y])[0]
-        P = continuous_field(r_b, p.lateral)[0]
+        P = continuous_field(scene.area, z_next[S], z_next[Y], p.lateral)[0]
         yaw_acceleration = (z_next[R] - z[R]) / p.task.dt
         total += (
             w.R * P * P
@@ -83,7 +81,7 @@ def linearise(U: np.ndarray, scene: Record, p: Parameters, work: Record) -> floa
     w = p.automation
     z, z_next = work.z, work.z_next
     sens, sens_next = work.sensitivity, work.sensitivity_next
-    clear(work)
+    clear(work, 2 * w.H_c)
     for i in range(6):
         z[i] = scene.z[i]
     total = 0.0
@@ -93,11 +91,10 @@ def linearise(U: np.ndarray, scene: Record, p: Parameters, work: Record) -> floa
         implicit_step_jacobian(z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next, work.A, work.B)
         propagate(work.A, work.B, sens, sens_next, n)
         total += add_tracking(work, w, p.task.dt, z, z_next, sens, sens_next, scene.y_target, scene.v_target, n)
-        r_b, r_b_s, r_b_d = boundary_distance(scene.area, z_next[S], z_next[Y])
-        P, P_r = continuous_field(r_b, p.lateral)
+        P, P_s, P_d = continuous_field(scene.area, z_next[S], z_next[Y], p.lateral)
         if P > 0.0:
             for c in range(n):
-                work.row[c] = P_r * (r_b_s * sens_next[S, c] + r_b_d * sens_next[Y, c])
+                work.row[c] = P_s * sens_next[S, c] + P_d * sens_next[Y, c]
             total += add_square(work, w.R, P, n)
         z, z_next = z_next, z
         sens, sens_next = sens_next, sens
@@ -127,28 +124,37 @@ def projected_gradient(U: np.ndarray, gradient: np.ndarray, H_c: int, limits: Li
 
 
 @jit
-def _search_line(U: np.ndarray, value: float, scene: Record, p: Parameters, work: Record) -> float:
-    """Backtrack along ``work.step`` to a sufficient decrease and move U there; return the cost, or inf."""
+def _plan_step(U: np.ndarray, p: Parameters, work: Record) -> float:
+    """Step to the quadratic model's minimum within the bounds, in ``work.step``; return the cost's slope along it."""
     n = 2 * p.automation.H_c
+    for c in range(n):
+        bound = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
+        work.low[c] = -bound - U[c // 2, c % 2]
+        work.high[c] = bound - U[c // 2, c % 2]
+        work.trial[c // 2, c % 2] = U[c // 2, c % 2]
+    solve_box_qp(
+        n,
+        work.hessian,
+        work.gradient,
+        work.low,
+        work.high,
+        work.step,
+        work.factor,
+        work.solution,
+        work.bound,
+    )
     slope = 0.0
     for c in range(n):
         slope += 2.0 * work.gradient[c] * work.step[c]
-    length = 1.0
-    while length > _SHORTEST_STEP:
-        for c in range(n):
-            work.trial[c // 2, c % 2] = U[c // 2, c % 2] + length * work.step[c]
-        trial_value = cost(work.trial, scene, p, work)
-        if trial_value <= value + _ARMIJO * length * slope:
-            for c in range(n):
-                U[c // 2, c % 2] = work.trial[c // 2, c % 2]
-            return trial_value
-        length *= 0.5
-    return np.inf
+    return slope
 
 
 @jit
 def solve(U: np.ndarray, scene: Record, p: Parameters, iterations: int, work: Record) -> tuple[int, int, float, float]:
     """Minimise Eq. 13 over the bounded commands, from the guess U.
+
+    Each step is halved until the cost falls enough (Armijo). A step is tried by linearising there, which the
+    next iteration needs anyhow; the last one by the cost alone.
 
     Args:
         U: first guess, overwritten with the solution, shape (>= H_c, 2).
@@ -159,26 +165,28 @@ def solve(U: np.ndarray, scene: Record, p: Parameters, iterations: int, work: Re
         Status, iterations done, projected gradient at the last linearisation, cost.
     """
     H_c = p.automation.H_c
-    n = 2 * H_c
-    value = residual = np.inf
+    value = linearise(U, scene, p, work)
+    residual = projected_gradient(U, work.gradient, H_c, p.limits)
     for iteration in range(iterations):
-        value = linearise(U, scene, p, work)
-        residual = projected_gradient(U, work.gradient, H_c, p.limits)
         if not (np.isfinite(value) and np.isfinite(residual)):
             return FAILED, iteration, residual, value
         if residual <= TOLERANCE:
             return CONVERGED, iteration, residual, value
-        for c in range(n):
-            bound = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
-            work.low[c] = -bound - U[c // 2, c % 2]
-            work.high[c] = bound - U[c // 2, c % 2]
-        solve_box_qp(
-            n, work.hessian, work.gradient, work.low, work.high, work.step, work.factor, work.solution, work.bound
-        )
-        trial_value = _search_line(U, value, scene, p, work)
-        if not np.isfinite(trial_value):
-            return ITERATION_LIMIT, iteration + 1, residual, value
+        slope = _plan_step(U, p, work)
+        last = iteration + 1 == iterations
+        length, trial_value = 2.0, np.inf
+        while not trial_value <= value + _ARMIJO * length * slope:
+            length *= 0.5
+            if length < _SHORTEST_STEP:
+                length, trial_value = 0.0, value
+            for c in range(2 * H_c):
+                U[c // 2, c % 2] = work.trial[c // 2, c % 2] + length * work.step[c]
+            if length == 0.0:
+                return ITERATION_LIMIT, iteration + 1, residual, value
+            trial_value = cost(U, scene, p, work) if last else linearise(U, scene, p, work)
         value = trial_value
+        if not last:
+            residual = projected_gradient(U, work.gradient, H_c, p.limits)
     return ITERATION_LIMIT, iterations, residual, value
 
 

@@ -30,7 +30,7 @@ WORKSPACE = np.dtype(
         ("step", np.float64, (_N,)),  # of the commands
         ("low", np.float64, (_N,)),  # bounds of the step
         ("high", np.float64, (_N,)),
-        ("trial", np.float64, (MAX_CONTROL, 2)),  # commands tried by the line search
+        ("trial", np.float64, (MAX_CONTROL, 2)),  # commands that a step starts from
         ("factor", np.float64, (_N, _N)),  # scratch of the quadratic program
         ("solution", np.float64, (_N,)),
         ("bound", np.int64, (_N,)),
@@ -41,12 +41,14 @@ WORKSPACE = np.dtype(
 
 
 @jit
-def clear(work: Record) -> None:
-    """Start a condensation: zero gradient, Hessian and sensitivities of a :data:`WORKSPACE` record."""
-    work.gradient[:] = 0.0
-    work.hessian[:] = 0.0
-    work.sensitivity[:] = 0.0
-    work.sensitivity_next[:] = 0.0
+def clear(work: Record, n: int) -> None:
+    """Start a condensation of n columns: zero gradient, Hessian and sensitivities of a :data:`WORKSPACE` record."""
+    for c in range(n):
+        work.gradient[c] = 0.0
+        for e in range(n):
+            work.hessian[c, e] = 0.0
+        for i in range(6):
+            work.sensitivity[i, c] = work.sensitivity_next[i, c] = 0.0
 
 
 @jit
@@ -124,17 +126,16 @@ def add_tracking(
     Returns:
         The terms' value.
     """
-    row = work.row
+    gradient, hessian = work.gradient, work.hessian
+    y_error, v_error = z_next[Y] - y_target, z_next[V_X] - v_target
+    yaw_acceleration = (z_next[R] - z[R]) / dt
     for c in range(n):
-        row[c] = sens_next[Y, c]
-    value = add_square(work, weights.W, z_next[Y] - y_target, n)
-    for c in range(n):
-        row[c] = sens_next[V_X, c]
-    value += add_square(work, weights.H, z_next[V_X] - v_target, n)
-    for c in range(n):
-        row[c] = (sens_next[R, c] - sens[R, c]) / dt
-    value += add_square(work, weights.N, (z_next[R] - z[R]) / dt, n)
-    return value
+        wy, wv = weights.W * sens_next[Y, c], weights.H * sens_next[V_X, c]
+        wr = weights.N * (sens_next[R, c] - sens[R, c]) / (dt * dt)
+        gradient[c] += wy * y_error + wv * v_error + wr * yaw_acceleration * dt
+        for e in range(c + 1):
+            hessian[c, e] += wy * sens_next[Y, e] + wv * sens_next[V_X, e] + wr * (sens_next[R, e] - sens[R, e])
+    return weights.W * y_error**2 + weights.H * v_error**2 + weights.N * yaw_acceleration**2
 
 
 @jit

@@ -22,7 +22,7 @@ MAX_HOLES = 8
 """Most holes in a region."""
 
 MAX_VERTICES = 160
-"""Most vertices; the borders of eight rectangles laid as a grid cross the most, at about 100 points."""
+"""Most vertices, hidden corners included; eight bars laid as a grid across the border have 132."""
 
 MAX_TRIANGLES = MAX_VERTICES + 2 * MAX_HOLES
 """Most triangles: Euler's formula gives n_vertices - 2 and two for every hole."""
@@ -35,22 +35,14 @@ FAILED = -1
 
 WORKSPACE = np.dtype(
     [
-        (
-            "sides",
-            np.float64,
-            (4 * MAX_HOLES + 4, 2, 2),
-        ),  # ends (s, d) of the region's and the holes' sides [m]
+        ("sides", np.float64, (4 * MAX_HOLES + 4, 2, 2)),  # ends of the region's and the holes' sides [m]
         ("vertices", np.float64, (MAX_VERTICES, 2)),  # (s, d) [m]
         ("n_vertices", np.int64),
         ("pieces", np.int64, (MAX_FRONT, 2)),  # uncovered pieces of the sides, vertices from and to
         ("n_pieces", np.int64),
         ("front", np.int64, (MAX_FRONT, 2)),  # boundary of what is left to triangulate, vertices from and to
         ("n_front", np.int64),
-        (
-            "cotangents",
-            np.float64,
-            (MAX_FRONT,),
-        ),  # of the angles under which the front's vertices see an edge
+        ("cotangents", np.float64, (MAX_FRONT,)),  # of the angles under which an edge is seen from the front
         ("covered", np.float64, (MAX_HOLES, 2)),  # intervals of one side that holes cover, in [0, 1]
         ("cutters", np.int64, (MAX_HOLES, 2)),  # sides that bound these intervals, or -1 at the side's ends
         ("triangles", np.float64, (MAX_TRIANGLES, 3, 2)),  # the result, counter-clockwise (s, d) [m]
@@ -70,8 +62,9 @@ _TIE = 1e-9
 def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.ndarray) -> int:
     """Constrained Delaunay triangles of a rectangle less its holes (Table I, step 1).
 
-    The diagonals among cocircular points are not unique; which are taken depends on nothing but the order of
-    the holes and of their corners.
+    The vertices are those of the difference polygon, points on its straight sides where holes touch included.
+    The diagonals among cocircular points are not unique; those taken depend on the order of the holes and of
+    their corners, not on rounding.
 
     Args:
         region: start, end along the road and low, high across it [m], shape (4,).
@@ -81,8 +74,8 @@ def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.nd
 
     Returns:
         Number of triangles, 0 when the holes cover the region; FAILED with more than MAX_HOLES holes, when
-        the free region has more than MAX_VERTICES vertices, or when features of the size of the tolerance
-        leave its boundary open.
+        the free region has more than MAX_VERTICES vertices, or when sides that miss each other by about the
+        tolerance (neither touching nor clear of it) leave its boundary open.
     """
     if n_holes > MAX_HOLES:
         return FAILED

@@ -66,22 +66,25 @@ def build_program(
     H_p = w.H_p
     z, z_next = work.z, work.z_next
     sens, sens_next = work.sensitivity, work.sensitivity_next
-    clear(work)
+    clear(work, n)
     for i in range(6):
         z[i] = scene.z[i]
     # A command that would stop the car within the step hides that it can start off: linearise at rest.
     a = max(u_last[0], -z[V_X] / dt - z[R] * z[V_Y])
     delta = u_last[1]
     affine = np.empty(6)
-    A[:] = 0.0
+    for i in range(2 * H_p + n + 1):
+        for c in range(n + 1):
+            A[i, c] = 0.0
     for i in range(H_p):
         columns = 2 * min(i, w.H_c - 1) + 2
-        # z(i+1) = A z(i) + B u(i) + affine, with A, B and affine taken at the current state.
-        implicit_step_jacobian(scene.z, a, delta, scene.kappa[i], dt, p.vehicle, affine, work.A, work.B)
-        for j in range(6):
-            for m in range(6):
-                affine[j] -= work.A[j, m] * scene.z[m]
-            affine[j] -= work.B[j, 0] * a + work.B[j, 1] * delta
+        # z(i+1) = A z(i) + B u(i) + affine, with A, B and affine at the current state; they vary with kappa alone.
+        if i == 0 or scene.kappa[i] != scene.kappa[i - 1]:
+            implicit_step_jacobian(scene.z, a, delta, scene.kappa[i], dt, p.vehicle, affine, work.A, work.B)
+            for j in range(6):
+                for m in range(6):
+                    affine[j] -= work.A[j, m] * scene.z[m]
+                affine[j] -= work.B[j, 0] * a + work.B[j, 1] * delta
         for j in range(6):
             z_next[j] = affine[j]
             for m in range(6):
@@ -101,13 +104,15 @@ def build_program(
         low[H_p + i], high[H_p + i] = lower - z_next[Y], UNBOUNDED
         z, z_next = z_next, z
         sens, sens_next = sens_next, sens
-    work.trial[:] = 0.0
+    for j in range(w.H_c):
+        work.trial[j, 0] = work.trial[j, 1] = 0.0
     add_effort(work, w, work.trial)
     for c in range(n + 1):
         A[2 * H_p + c, c] = 1.0
         low[2 * H_p + c], high[2 * H_p + c] = -1.0, 1.0
     low[2 * H_p + n], high[2 * H_p + n] = 0.0, UNBOUNDED
-    P[:] = 0.0
+    for c in range(n):
+        P[c, n] = P[n, c] = 0.0
     for c in range(n):
         bound_c = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
         q[c] = 2.0 * work.gradient[c] * bound_c

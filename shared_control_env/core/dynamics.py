@@ -154,11 +154,12 @@ def implicit_step_jacobian(
         A: written, shape (6, 6).
         B: written, shape (6, 2).
     """
+    # Read before the step may overwrite it, so that the compiler need not repeat the step's sines.
+    y, psi, v_x, v_y, r = z[Y], z[PSI], z[V_X], z[V_Y], z[R]
     implicit_step(z, a, delta, kappa, h, vehicle, z_next)
-    y, psi, v_y, r = z[Y], z[PSI], z[V_Y], z[R]
     v, v_y1, r1, psi1 = z_next[V_X], z_next[V_Y], z_next[R], z_next[PSI]
     # At rest the derivative is that of starting off, or a controller would never start.
-    moving = 1.0 if z[V_X] + h * (a + r * v_y) >= 0.0 else 0.0
+    moving = 1.0 if v_x + h * (a + r * v_y) >= 0.0 else 0.0
     m11, m12, m21, m22, _, _ = _lateral_system(v, v_y, r, delta, h, vehicle)
     det = m11 * m22 - m12 * m21
     K_f, c, sn = 2.0 * vehicle.C_f, cos(delta), sin(delta)
@@ -173,8 +174,10 @@ def implicit_step_jacobian(
     e2 = h * vehicle.l_f * K_f * v / vehicle.I_z
     V_d, R_d = (e1 * m22 - e2 * m12) / det, (e2 * m11 - e1 * m21) / det
 
-    A[:] = 0.0
-    B[:] = 0.0
+    for i in range(6):
+        for j in range(6):
+            A[i, j] = 0.0
+        B[i, 0] = B[i, 1] = 0.0
     v_vx, v_vy, v_r, v_a = moving, moving * h * r, moving * h * v_y, moving * h
     A[V_X, V_X], A[V_X, V_Y], A[V_X, R], B[V_X, 0] = v_vx, v_vy, v_r, v_a
     A[V_Y, V_X], A[V_Y, V_Y], A[V_Y, R] = V_v * v_vx, V_vy + V_v * v_vy, V_r + V_v * v_r

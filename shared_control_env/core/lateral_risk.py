@@ -7,7 +7,7 @@ from math import exp
 from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import LateralRiskParameters
 from shared_control_env.core.records import Record
-from shared_control_env.core.safe_area import boundary_distance
+from shared_control_env.core.safe_area import boundary_distance, boundary_offset
 
 
 @jit
@@ -30,21 +30,25 @@ def boundary_field(r_b: float, parameters: LateralRiskParameters) -> float:
 
 
 @jit
-def continuous_field(r_b: float, parameters: LateralRiskParameters) -> tuple[float, float]:
-    """Eq. 2 less its value at the cut-off, so that a controller's cost is continuous.
+def continuous_field(area: Record, s: float, d: float, parameters: LateralRiskParameters) -> tuple[float, float, float]:
+    """Eq. 2 less its value at the cut-off, so that a controller's cost is continuous; outside C its peak.
 
     Args:
-        r_b: distance to the nearer boundary [m].
+        area: record of :data:`records.SAFE_AREA`.
+        s, d: position in the road frame [m].
         parameters: of the field.
 
     Returns:
-        Field value [-] and its derivative with respect to r_b [1/m].
+        Field value [-] and its derivatives with respect to s and d [1/m].
     """
-    field = boundary_field(r_b, parameters)
-    if field == 0.0:
-        return 0.0, 0.0
-    floor = boundary_field(parameters.d_c + 0.5 * parameters.v_w, parameters)
-    return field - floor, -2.0 * r_b / parameters.sigma_y**2 * field
+    cut = parameters.d_c + 0.5 * parameters.v_w
+    square, ds, dd = boundary_offset(area, s, d)
+    if square > cut * cut:
+        return 0.0, 0.0, 0.0
+    variance = parameters.sigma_y * parameters.sigma_y
+    field = parameters.alpha_f * exp(-square / variance)
+    slope = -2.0 / variance * field
+    return field - parameters.alpha_f * exp(-cut * cut / variance), slope * ds, slope * dd
 
 
 @jit
@@ -59,5 +63,5 @@ def lateral_risk(area: Record, s: float, d: float, parameters: LateralRiskParame
     Returns:
         Risk in [0, 1].
     """
-    r_b = boundary_distance(area, s, d)[0]
+    r_b = boundary_distance(area, s, d)
     return max(0.0, boundary_field(r_b, parameters) / parameters.alpha_f)

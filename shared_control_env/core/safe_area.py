@@ -283,10 +283,9 @@ def _search(
 @jit
 def _start_chains(area: Record, s: float, d: float) -> None:
     """Set both boundaries to a single point, the form of an empty area."""
-    area.lower[:, 0] = s
-    area.lower[:, 1] = d
-    area.upper[:, 0] = s
-    area.upper[:, 1] = d
+    for k in range(MAX_CHAIN):
+        area.lower[k, 0], area.lower[k, 1] = s, d
+        area.upper[k, 0], area.upper[k, 1] = s, d
 
 
 @jit
@@ -392,59 +391,53 @@ def _on_open_end(area: Record, s: float) -> float:
 
 
 @jit
-def _crossings(chain: np.ndarray, s: float, d: float) -> int:
-    """Segments of a chain above the point (s, d), for the even-odd rule."""
-    count = 0
+def _scan_chain(chain: np.ndarray, s: float, d: float) -> tuple[int, float, float, float]:
+    """Segments of a chain above a point, for the even-odd rule; its squared distance, and the vector from there."""
+    above, best, best_s, best_d = 0, np.inf, 0.0, 0.0
     for k in range(MAX_CHAIN - 1):
-        s1, d1, s2, d2 = chain[k, 0], chain[k, 1], chain[k + 1, 0], chain[k + 1, 1]
-        if s1 == s2 and d1 == d2:
-            break
-        if (s1 <= s) != (s2 <= s) and d1 + (d2 - d1) * (s - s1) / (s2 - s1) > d:
-            count += 1
-    return count
-
-
-@jit
-def _nearest_on_chain(chain: np.ndarray, s: float, d: float) -> tuple[float, float, float]:
-    """Squared distance from (s, d) to a chain, and the vector from its nearest point."""
-    best, best_s, best_d = np.inf, 0.0, 0.0
-    for k in range(MAX_CHAIN - 1):
-        s1, d1 = chain[k, 0], chain[k, 1]
-        es, ed = chain[k + 1, 0] - s1, chain[k + 1, 1] - d1
+        es, ed = chain[k + 1, 0] - chain[k, 0], chain[k + 1, 1] - chain[k, 1]
+        ds, dd = s - chain[k, 0], d - chain[k, 1]
         square = es * es + ed * ed
-        if square == 0.0:
-            if k > 0:
-                break
-            square = 1.0
-        along = min(max(((s - s1) * es + (d - d1) * ed) / square, 0.0), 1.0)
-        ds, dd = s - s1 - along * es, d - d1 - along * ed
+        if square == 0.0 and k > 0:
+            break
+        if (ds >= 0.0) != (s >= chain[k + 1, 0]) and (ed * ds > dd * es) == (es > 0.0):
+            above += 1
+        along = ds * es + dd * ed
+        if along >= square:
+            ds, dd = ds - es, dd - ed
+        elif along > 0.0:
+            along /= square
+            ds, dd = ds - along * es, dd - along * ed
         if ds * ds + dd * dd < best:
             best, best_s, best_d = ds * ds + dd * dd, ds, dd
-    return best, best_s, best_d
+    return above, best, best_s, best_d
 
 
 @jit
-def boundary_distance(area: Record, s: float, d: float) -> tuple[float, float, float]:
-    """Distance r_b from a point to the nearer boundary of C; 0 outside C.
+def boundary_offset(area: Record, s: float, d: float) -> tuple[float, float, float]:
+    """Squared distance from a point to the nearer boundary of C, and the vector from there; zeros outside C.
 
     Args:
         area: record of :data:`records.SAFE_AREA`.
         s, d: the point [m].
 
     Returns:
-        r_b [m] and its gradient with respect to s and d.
+        Squared distance [m^2]; s and d components of the vector [m].
     """
     s = _on_open_end(area, s)
-    if (_crossings(area.lower, s, d) + _crossings(area.upper, s, d)) % 2 == 0:
+    above_lower, square, ds, dd = _scan_chain(area.lower, s, d)
+    above_upper, square_upper, ds_upper, dd_upper = _scan_chain(area.upper, s, d)
+    if (above_lower + above_upper) % 2 == 0:
         return 0.0, 0.0, 0.0
-    square, ds, dd = _nearest_on_chain(area.lower, s, d)
-    square_upper, ds_upper, dd_upper = _nearest_on_chain(area.upper, s, d)
     if square_upper < square:
-        square, ds, dd = square_upper, ds_upper, dd_upper
-    r_b = square**0.5
-    if r_b == 0.0:
-        return 0.0, 0.0, 0.0
-    return r_b, ds / r_b, dd / r_b
+        return square_upper, ds_upper, dd_upper
+    return square, ds, dd
+
+
+@jit
+def boundary_distance(area: Record, s: float, d: float) -> float:
+    """Distance r_b from a point to the nearer boundary of C [m]; 0 outside C. Arguments as :func:`boundary_offset`."""
+    return boundary_offset(area, s, d)[0] ** 0.5
 
 
 @jit

@@ -86,7 +86,7 @@ class SharedControlVectorEnv(VectorEnv):
         limiter: bind alpha_a with the fuzzy inference; else it is the action's slot ``authority``.
         driver: bind the driver's command with the paper's predictive driver, solved by an active-set method in
             the kernel; else it is the action's slot ``driver``.
-        autoreset_mode: Gymnasium's mode or its name.
+        autoreset_mode: Gymnasium's mode or its name, such as ``same_step``.
         threads: how many; by default one a core, and fewer for few environments.
 
     Raises:
@@ -112,11 +112,10 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"num_envs = {num_envs} must be at least 1")
         if threads is not None and threads < 1:
             raise ValueError(f"threads = {threads} must be at least 1, or None for one a core")
-        try:
-            self._mode = AutoresetMode(autoreset_mode)
-        except ValueError:
-            valid = [mode.value for mode in AutoresetMode]
-            raise ValueError(f"autoreset_mode = {autoreset_mode!r} must be one of {valid}") from None
+        names = {mode.name.lower(): mode for mode in AutoresetMode}
+        if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in names:
+            raise ValueError(f"autoreset_mode = {autoreset_mode!r} must be an AutoresetMode or one of {sorted(names)}")
+        self._mode = autoreset_mode if isinstance(autoreset_mode, AutoresetMode) else names[autoreset_mode]
         self.num_envs, self.render_mode = num_envs, render_mode
         self._limiter, self._driver = limiter, driver
         self._scenario, self._viewer_env = scenario, None

@@ -1,0 +1,129 @@
+"""Cost of each part of a vectorised step, timed in compiled loops over situations of a closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import gymnasium as gym
+import numpy as np
+from numba import njit
+
+from benchmarks.timing import Timing, time_block
+from shared_control_env.core import (
+    assessment,
+    automation_mpc,
+    delaunay,
+    driver_qp,
+    dynamics,
+    fuzzy,
+    observation,
+    safe_area,
+)
+from shared_control_env.core import scene as scenes
+from shared_control_env.core.active_set_qp import solve_qp
+from shared_control_env.vector.records import PROGRAM, WORKSPACE
+
+N = 256
+"""Situations in one loop."""
+
+
+@njit
+def _automation(batch, setup, works, programs):
+    for i in range(batch.scenes.shape[0]):
+        automation_mpc.solve(batch.automations[i].U, batch.scenes[i], batch.parameters[i], 2, works[0].solver)
+
+
+@njit
+def _perception(batch, setup, works, programs):
+    for i in range(batch.scenes.shape[0]):
+        scene = batch.scenes[i]
+        scenes.perceive(scene.k, batch.states[i], batch.traffic[i], setup.line, batch.parameters[i], scene)
+
+
+@njit
+def _triangulation(batch, setup, works, programs):
+    work = works[0]
+    for i in range(batch.scenes.shape[0]):
+        scene = batch.scenes[i]
+        s = scene.region[0] + 0.5 * (scene.region[1] - scene.region[0])
+        for n in range(4):
+            work.corners[0, n, 0] = s + (2.5 if n < 2 else -2.5)
+            work.corners[0, n, 1] = scene.region[3] + (0.7 if n == 0 or n == 3 else -0.6)
+        n = delaunay.triangulate(scene.region, work.corners, 1, work.triangles)
+        safe_area.search_triangles(
+            work.triangles.triangles[:n], scene.region[0], scene.region[1], scene.z[1], 2.0, scene.area
+        )
+
+
+@njit
+def _risk(batch, setup, works, programs):
+    for i in range(batch.scenes.shape[0]):
+        assessment.assess(batch.scenes[i], batch.traffic[i], setup.line, batch.parameters[i], batch.signals[i])
+
+
+@njit
+def _fuzzy(batch, setup, works, programs):
+    for i in range(batch.scenes.shape[0]):
+        batch.signals[i].alpha_a = fuzzy.authority(batch.signals[i].r_x, batch.signals[i].r_y, 0)
+
+
+@njit
+def _dynamics(batch, setup, works, programs):
+    work = works[0]
+    for i in range(batch.scenes.shape[0]):
+        for n in range(6):
+            work.plant[0, n] = batch.states[i, n]
+        dynamics.plant_step(batch.states[i], 0.0, 0.0, 1e-9, batch.parameters[i].vehicle, work.plant)
+
+
+@njit
+def _observation(batch, setup, works, programs):
+    out = np.empty(25, dtype=np.float32)
+    for i in range(batch.scenes.shape[0]):
+        observation.observe(batch.scenes[i], batch.memories[i], setup.line, batch.parameters[i], out)
+
+
+@njit
+def _driver(batch, setup, works, programs):
+    g = programs[0]
+    for i in range(batch.scenes.shape[0]):
+        p = batch.parameters[i]
+        driver_qp.build_program(
+            batch.scenes[i], batch.memories[i].u_h_des, p, works[0].solver, g.P, g.q, g.A, g.low, g.high
+        )
+        n = 2 * p.driver.H_c + 1
+        m = 2 * p.driver.H_p + n
+        solve_qp(n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set)
+
+
+PARTS: dict[str, Callable[..., None]] = {
+    "automation, 2 Gauss-Newton iterations": _automation,
+    "scene: road frame, neighbours, region": _perception,
+    "triangulation and search, 1 vehicle inside": _triangulation,
+    "risk: prediction, both fields": _risk,
+    "fuzzy inference": _fuzzy,
+    "dynamics": _dynamics,
+    "observation": _observation,
+    "driver's program and active-set solver": _driver,
+}
+"""Name and loop of every part."""
+
+
+def times(repeats: int) -> dict[str, Timing]:
+    """Time of each part for one environment."""
+    found = {}
+    for name, loop in PARTS.items():
+        env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=N, threads=1)
+        env.reset(seed=0)
+        rng = np.random.default_rng(0)
+        for _ in range(25):
+            env.step(0.1 * rng.normal(size=(N, 2)).clip(-1, 1))
+        batch, setup = env.unwrapped._batch, env.unwrapped._setup  # type: ignore[attr-defined]
+        works, programs = np.zeros(1, WORKSPACE), np.zeros(1, PROGRAM)
+
+        def block(loop=loop, batch=batch, setup=setup, works=works, programs=programs) -> int:
+            loop(batch, setup, works, programs)
+            return N
+
+        found[name] = time_block(block, repeats)
+    return found

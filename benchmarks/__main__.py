@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import platform
+from collections.abc import Callable
 from importlib.metadata import version
 from typing import Annotated
 
@@ -10,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import controllers, environments, startup
+from benchmarks import controllers, environments, parts, startup, vectors
 from benchmarks.timing import Timing
 
 
@@ -42,12 +44,39 @@ def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timi
     report("first step after the import, warm caches", f"{after.median:.2f} s", "", "3 s")
     report("import and first step, warm caches", f"{whole.median:.2f} s", "", "")
 
+    _vectors(report, peer, limited, repeats)
+    report("vector env, import to first step, cold", f"{startup.vector_start(cold=True):.1f} s", "", "30 s")
+    report("vector env, import to first step, warm", f"{startup.vector_start(cold=False):.2f} s", "", "2 s")
+
     packages = ", ".join(f"{name} {version(name)}" for name in ("highway-env", "gymnasium", "numpy", "numba", "osqp"))
     table = Table("what", "median (10th to 90th percentile)", "ratio", "target", title="Speed, measured in one run")
     for row in rows:
         table.add_row(*row)
     console.print(table)
     console.print(f"Python {platform.python_version()}, {packages}; {repeats} repeats, seed 0.")
+
+
+def _vectors(report: Callable[..., None], peer: Timing, single: Timing, repeats: int) -> None:
+    """Rows of the vectorised environment."""
+    processes = vectors.highway_processes(max(3, repeats // 3))
+    report("highway-env in processes, a step", str(processes), _times(peer, processes), "")
+    metadrive = vectors.metadrive(max(3, repeats // 3))
+    if metadrive is not None:
+        report("MetaDrive, a step", str(metadrive), _times(peer, metadrive), "")
+    cores = os.cpu_count() or 1
+    for driver, target in ((False, "100,000 steps/s a core"), (True, "80,000 steps/s a core")):
+        who = "driver in the kernel" if driver else "random driver"
+        for n in vectors.SIZES:
+            one = vectors.kernel(n, 1, driver, repeats)
+            rate = f"{_times(single, one)} single, {1.0 / one.median:,.0f}/s"
+            report(f"kernel, N = {n}, {who}, 1 core", str(one), rate, target if n == 1024 else "")
+            if cores > 1 and n >= 1024:
+                many = vectors.kernel(n, cores, driver, repeats)
+                rate = f"{_times(one, many)} one core, {1.0 / many.median:,.0f}/s"
+                report(f"kernel, N = {n}, {who}, {cores} cores", str(many), rate, "1.9 x on two cores")
+    report("memory of an environment", f"{vectors.bytes_per_environment():,} B", "", "4,096 B")
+    for name, timing in parts.times(repeats).items():
+        report(f"part: {name}", str(timing), "", "")
 
 
 def _times(slow: Timing, fast: Timing) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import gymnasium as gym
 import highway_env
@@ -30,10 +31,9 @@ def stepper(env: gym.Env, action: Callable[[], object], steps: int) -> Callable[
     return block
 
 
-def highway(repeats: int) -> Timing:
+def highway_config() -> dict[str, Any]:
     """highway-env with 4 vehicles, ContinuousAction (dynamical), Kinematics, 20 Hz simulation and policy."""
-    gym.register_envs(highway_env)
-    config = {
+    return {
         "vehicles_count": 3,
         "lanes_count": 2,
         "action": {"type": "ContinuousAction", "dynamical": True},
@@ -42,7 +42,12 @@ def highway(repeats: int) -> Timing:
         "policy_frequency": 20,
         "duration": 10,
     }
-    env = gym.make("highway-v0", config=config)
+
+
+def highway(repeats: int) -> Timing:
+    """highway-env's own environment with :func:`highway_config`."""
+    gym.register_envs(highway_env)
+    env = gym.make("highway-v0", config=highway_config())
     env.action_space.seed(0)
     return time_block(stepper(env, env.action_space.sample, 100), repeats)
 

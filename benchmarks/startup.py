@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import tempfile
 
 from benchmarks.timing import Timing
 
@@ -18,6 +20,33 @@ env.reset(seed=0)
 env.step(env.action_space.sample())
 print(perf_counter() - imported, perf_counter() - begin)
 """
+
+
+VECTOR_CODE = """
+from time import perf_counter
+begin = perf_counter()
+import gymnasium as gym, numpy as np
+import shared_control_env
+env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=64, threads=1)
+env.reset(seed=0)
+env.step(np.zeros((64, 2)))
+print(perf_counter() - begin)
+"""
+
+
+def vector_start(cold: bool) -> float:
+    """Seconds from the import to the end of the kernel's first step, in a new process.
+
+    Args:
+        cold: with an empty numba cache, in a folder of its own.
+    """
+    environment = dict(os.environ)
+    with tempfile.TemporaryDirectory() as folder:
+        if cold:
+            environment["NUMBA_CACHE_DIR"] = folder
+        command = [sys.executable, "-c", VECTOR_CODE]
+        result = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    return float(result.stdout)
 
 
 def first_step(repeats: int) -> tuple[Timing, Timing]:

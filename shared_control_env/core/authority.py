@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.parameters import LawParameters
 
 LAWS = ("paper", "proportional", "none", "driver_only")
@@ -43,7 +43,7 @@ def limit_channel(u_des: float, u_f: float, alpha: float, tolerance: float) -> f
     return alpha * u_des
 
 
-@jit
+@jit_inlined
 def apply_law(
     law: int, u_des: np.ndarray, u_f: np.ndarray, alpha: float, parameters: LawParameters, u_act: np.ndarray
 ) -> None:

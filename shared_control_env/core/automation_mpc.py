@@ -11,7 +11,7 @@ import numpy as np
 from shared_control_env.core.box_qp import solve_box_qp
 from shared_control_env.core.condensing import add_effort, add_square, add_tracking, clear, propagate
 from shared_control_env.core.dynamics import V_X, R, S, Y, implicit_step, implicit_step_jacobian
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.lateral_risk import continuous_field
 from shared_control_env.core.parameters import Limits, Parameters
 from shared_control_env.core.records import Record
@@ -123,7 +123,7 @@ def projected_gradient(U: np.ndarray, gradient: np.ndarray, H_c: int, limits: Li
     return largest
 
 
-@jit
+@jit_inlined
 def _plan_step(U: np.ndarray, p: Parameters, work: Record) -> float:
     """Step to the quadratic model's minimum within the bounds, in ``work.step``; return the cost's slope along it."""
     n = 2 * p.automation.H_c

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.parameters import Limits
 
 CHANNELS = ("acceleration", "steering")
@@ -35,7 +35,7 @@ def bias(fault: np.ndarray, t: float) -> float:
     return fault[SIZE] * elapsed / fault[RAMP]
 
 
-@jit
+@jit_inlined
 def degrade(u_des: np.ndarray, t: float, faults: np.ndarray, limits: Limits, u_f: np.ndarray) -> None:
     """Apply every fault to the automation's desired command and clip to the physical limits.
 

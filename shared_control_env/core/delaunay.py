@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 
 MAX_HOLES = 8
 """Most holes in a region."""
@@ -100,7 +100,7 @@ def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.nd
     return count
 
 
-@jit
+@jit_inlined
 def _lay_sides(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.ndarray) -> None:
     """Sides of the region, then of the holes, four each, with the free region on their left.
 
@@ -177,7 +177,7 @@ def _inside(sides: np.ndarray, e: int, polygon: int) -> tuple[float, float, int,
     return first, last, first_cut, last_cut
 
 
-@jit
+@jit_inlined
 def _covered_parts(n_sides: int, e: int, work: np.ndarray) -> int:
     """Parts of a side that other holes cover, into ``work.covered`` sorted by where they begin; how many."""
     covered, cutters = work.covered, work.cutters
@@ -199,7 +199,7 @@ def _covered_parts(n_sides: int, e: int, work: np.ndarray) -> int:
     return count
 
 
-@jit
+@jit_inlined
 def _find_pieces(n_sides: int, work: np.ndarray) -> bool:
     """Pieces of all sides that lie in the region and that no hole covers; False when there is no room."""
     work.n_pieces = 0
@@ -254,7 +254,7 @@ def _cut_vertex(work: np.ndarray, e: int, cut: int, end: int) -> int:
     return _vertex(work, s, d)
 
 
-@jit
+@jit_inlined
 def _close_boundary(work: np.ndarray) -> bool:
     """Make the pieces the front, split at the vertices that lie on them; False when there is no room."""
     work.n_front = 0
@@ -298,7 +298,7 @@ def _put_edge(work: np.ndarray, a: int, b: int) -> None:
     work.n_front = n + 1
 
 
-@jit
+@jit_inlined
 def _apex(work: np.ndarray, a: int, b: int) -> int:
     """Visible vertex that sees an edge from its left under the largest angle, or -1.
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 
 OPERATORS = ("product-sum", "min-max")
 """Names of the inference operators; an operator's index is its code in compiled functions."""
@@ -59,22 +59,14 @@ def membership(value: float, term: int, n_terms: int) -> float:
     return 1.0 - 2.0 * q * q if q <= 0.5 else 2.0 * (1.0 - q) * (1.0 - q)
 
 
-@jit
-def _output_terms(universe: np.ndarray) -> np.ndarray:
-    """Membership of every output term on the universe, shape (7, 501)."""
-    terms = np.empty((7, universe.shape[0]))
-    for term in range(7):
-        for i in range(universe.shape[0]):
-            terms[term, i] = membership(universe[i], term, 7)
-    return terms
+OUTPUT_TERMS = np.array([[membership(value, term, 7) for value in UNIVERSE] for term in range(7)])
+"""Membership of every output term on the universe, shape (7, 501)."""
 
-
-OUTPUT_TERMS = _output_terms(UNIVERSE)
 _MASS = OUTPUT_TERMS.sum(axis=1)
 _MOMENT = OUTPUT_TERMS @ UNIVERSE
 
 
-@jit
+@jit_inlined
 def centroid_product_sum(r_x: float, r_y: float) -> float:
     """Centre of gravity with product and sum.
 
@@ -126,7 +118,7 @@ def centroid_min_max(r_x: float, r_y: float) -> float:
 _LOW, _HIGH = _MOMENT[0] / _MASS[0], _MOMENT[6] / _MASS[6]
 
 
-@jit
+@jit_inlined
 def authority(r_x: float, r_y: float, operators: int) -> float:
     """Authority of the automation, ``alpha_a = FIS(r_x, r_y)``.
 

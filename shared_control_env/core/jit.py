@@ -36,7 +36,15 @@ def jit_inlined(function: F) -> F:
 
 
 def _compile(function: F, inline: str) -> F:
-    dispatcher = njit(cache=True, error_model="numpy", nogil=True, no_cfunc_wrapper=True, inline=inline)(function)
+    private = function.__name__.startswith("_")  # never called from Python, so it needs no entry for it
+    dispatcher = njit(
+        cache=True,
+        error_model="numpy",
+        nogil=True,
+        no_cfunc_wrapper=True,
+        no_cpython_wrapper=private,
+        inline=inline,
+    )(function)
     _drop_stale_cache(dispatcher.stats.cache_path)
     return cast(F, dispatcher)
 

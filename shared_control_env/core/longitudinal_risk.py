@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy import special
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.parameters import LongitudinalRiskParameters
 
 FOLLOWER, LEADER, PRECEDING = range(3)
@@ -122,7 +122,7 @@ def pair_risk(v_e: float, v_o: float, dx: float, parameters: LongitudinalRiskPar
     return exp(min(0.0, 0.5 * ((d_s / sigma_x) ** power - (abs(dx) / sigma_x) ** power)))
 
 
-@jit
+@jit_inlined
 def longitudinal_risk(
     s_e: float,
     v_e: float,

@@ -14,7 +14,7 @@ from math import hypot
 import numpy as np
 import shapely
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.records import MAX_CHAIN, Record
 
 REACHED, BLOCKED = 0, 1
@@ -58,7 +58,7 @@ def find_safe_area(region: np.ndarray, d: float, holes: np.ndarray, min_width: f
     search_triangles(triangles, region[0], region[1], d, min_width, area)
 
 
-@jit
+@jit_inlined
 def whole_region(region: np.ndarray, area: Record) -> None:
     """Safe area of a driving region without a vehicle inside: the region itself, whatever its triangles.
 
@@ -108,7 +108,7 @@ def search_triangles(triangles: np.ndarray, start: float, end: float, d: float, 
     area.end = max(area.lower[MAX_CHAIN - 1, 0], area.upper[MAX_CHAIN - 1, 0])
 
 
-@jit
+@jit_inlined
 def orient(triangles: np.ndarray) -> None:
     """Make every triangle counter-clockwise, in place; shape (m, 3, 2)."""
     for i in range(triangles.shape[0]):
@@ -156,7 +156,7 @@ def adjacency(triangles: np.ndarray) -> np.ndarray:
     return neighbours
 
 
-@jit
+@jit_inlined
 def _edge_on_line(triangles: np.ndarray, line: float, d: float) -> tuple[int, int]:
     """Triangle and edge on the line s = line that hold, or are nearest to, the lateral position d; or -1, -1."""
     triangle, found, nearest = -1, -1, np.inf
@@ -308,7 +308,7 @@ def _finish_chains(area: Record, n_lower: int, n_upper: int) -> None:
         area.upper[k, 0], area.upper[k, 1] = area.upper[n_upper - 1, 0], area.upper[n_upper - 1, 1]
 
 
-@jit
+@jit_inlined
 def _trace_sequence(
     triangles: np.ndarray, parent: np.ndarray, entry: np.ndarray, goal: int, front_edge: int, area: Record
 ) -> None:
@@ -333,7 +333,7 @@ def _trace_sequence(
     _finish_chains(area, n_lower, n_upper)
 
 
-@jit
+@jit_inlined
 def _trace_reachable(
     triangles: np.ndarray,
     neighbours: np.ndarray,

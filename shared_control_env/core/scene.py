@@ -6,7 +6,7 @@ from math import cos, sin
 
 import numpy as np
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.longitudinal_risk import FOLLOWER, LEADER, PRECEDING
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import (
@@ -29,7 +29,7 @@ _SHORTEST_REGION = 0.5
 """Length kept of a driving region when the preceding vehicle is all but touched [m]."""
 
 
-@jit
+@jit_inlined
 def road_frame(line: np.ndarray, state: np.ndarray, z: np.ndarray) -> None:
     """State in the road frame.
 
@@ -51,7 +51,7 @@ def _keep_nearest(neighbours: np.ndarray, which: int, row: int, s: float, d: flo
         near[PRESENT], near[NEAR_S], near[NEAR_D], near[NEAR_SPEED], near[NEAR_ROW] = 1.0, s, d, v, row
 
 
-@jit
+@jit_inlined
 def find_neighbours(
     line: np.ndarray, traffic: np.ndarray, s_e: float, y_target: float, lane_width: float, neighbours: np.ndarray
 ) -> None:

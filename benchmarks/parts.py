@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import gymnasium as gym
 import numpy as np
@@ -21,27 +22,27 @@ from shared_control_env.core import (
 )
 from shared_control_env.core import scene as scenes
 from shared_control_env.core.active_set_qp import solve_qp
-from shared_control_env.vector.records import PROGRAM, WORKSPACE
+from shared_control_env.vector.records import PROGRAM, WORKSPACE, Batch, Setup
 
 N = 256
 """Situations in one loop."""
 
 
 @njit
-def _automation(batch, setup, works, programs):
+def _automation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         automation_mpc.solve(batch.automations[i].U, batch.scenes[i], batch.parameters[i], 2, works[0].solver)
 
 
 @njit
-def _perception(batch, setup, works, programs):
+def _perception(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         scene = batch.scenes[i]
         scenes.perceive(scene.k, batch.states[i], batch.traffic[i], setup.line, batch.parameters[i], scene)
 
 
 @njit
-def _triangulation(batch, setup, works, programs):
+def _triangulation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     work = works[0]
     for i in range(batch.scenes.shape[0]):
         scene = batch.scenes[i]
@@ -56,19 +57,19 @@ def _triangulation(batch, setup, works, programs):
 
 
 @njit
-def _risk(batch, setup, works, programs):
+def _risk(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         assessment.assess(batch.scenes[i], batch.traffic[i], setup.line, batch.parameters[i], batch.signals[i])
 
 
 @njit
-def _fuzzy(batch, setup, works, programs):
+def _fuzzy(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         batch.signals[i].alpha_a = fuzzy.authority(batch.signals[i].r_x, batch.signals[i].r_y, 0)
 
 
 @njit
-def _dynamics(batch, setup, works, programs):
+def _dynamics(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     work = works[0]
     for i in range(batch.scenes.shape[0]):
         for n in range(6):
@@ -77,14 +78,14 @@ def _dynamics(batch, setup, works, programs):
 
 
 @njit
-def _observation(batch, setup, works, programs):
+def _observation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     out = np.empty(25, dtype=np.float32)
     for i in range(batch.scenes.shape[0]):
         observation.observe(batch.scenes[i], batch.memories[i], setup.line, batch.parameters[i], out)
 
 
 @njit
-def _driver(batch, setup, works, programs):
+def _driver(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     g = programs[0]
     for i in range(batch.scenes.shape[0]):
         p = batch.parameters[i]
@@ -121,9 +122,10 @@ def times(repeats: int) -> dict[str, Timing]:
         batch, setup = env.unwrapped._batch, env.unwrapped._setup  # type: ignore[attr-defined]
         works, programs = np.zeros(1, WORKSPACE), np.zeros(1, PROGRAM)
 
-        def block(loop=loop, batch=batch, setup=setup, works=works, programs=programs) -> int:
-            loop(batch, setup, works, programs)
+        def block(run: Callable[[], None]) -> int:
+            run()
             return N
 
-        found[name] = time_block(block, repeats)
+        run = partial(loop, batch, setup, works, programs)
+        found[name] = time_block(partial(block, run), repeats)
     return found

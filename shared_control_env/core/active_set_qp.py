@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from shared_control_env.core.jit import jit
-from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON
+from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, Record
 
 SOLVED, ITERATION_LIMIT, FAILED = 0, 1, 2
 """Outcomes; FAILED: infeasible, not strictly convex, too large, not finite, or too ill-conditioned to solve."""
@@ -76,7 +76,7 @@ def solve_qp(
     high: np.ndarray,
     x: np.ndarray,
     multipliers: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> tuple[int, int, float, float]:
     """Minimise ``x^T P x / 2 + q^T x`` subject to ``low <= A x <= high``.
 
@@ -122,7 +122,7 @@ def solve_qp_array(
     high: np.ndarray,
     x: np.ndarray,
     multipliers: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> tuple[int, int, float, float]:
     """:func:`solve_qp` for calls from Python: ``work`` is an array of no dimension, as in :mod:`core.single`."""
     return solve_qp(n, m, P, q, A, low, high, x, multipliers, work[()])
@@ -137,7 +137,7 @@ def _begin(
     A: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> bool:
     """Clear the active set and sum up every row; False if the data is too large, not finite or contradictory."""
     if not (1 <= n <= MAX_VARIABLES and 0 <= m <= MAX_ROWS):
@@ -160,7 +160,7 @@ def _begin(
 
 
 @jit
-def _factorise(n: int, P: np.ndarray, work: np.ndarray) -> bool:
+def _factorise(n: int, P: np.ndarray, work: Record) -> bool:
     """T = L^-1 of the Cholesky factor, P = L L^T; False if P is not positive definite."""
     L, T = work.R, work.T
     for i in range(n):
@@ -194,7 +194,7 @@ def _iterate(
     low: np.ndarray,
     high: np.ndarray,
     x: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> tuple[int, int, int]:
     """The method proper: add violated rows, dropping active ones on the way, until none is violated.
 
@@ -252,7 +252,7 @@ def _dot(n: int, a: np.ndarray, b: np.ndarray) -> float:
 
 
 @jit
-def _to_x(n: int, work: np.ndarray, x: np.ndarray) -> None:
+def _to_x(n: int, work: Record, x: np.ndarray) -> None:
     """X = T^T y."""
     T, y = work.T, work.y
     for c in range(n):
@@ -279,7 +279,7 @@ def _most_violated(
     low: np.ndarray,
     high: np.ndarray,
     x: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> tuple[int, int]:
     """Row that x violates most relative to the row's size, and the bound it exceeds, 1 or -1; or -1, 0."""
     row, side, worst = -1, 0, FEASIBLE * _norm(n, x)
@@ -298,7 +298,7 @@ def _most_violated(
 
 
 @jit
-def _transform_normal(n: int, active: int, a: np.ndarray, side: int, work: np.ndarray) -> tuple[float, float]:
+def _transform_normal(n: int, active: int, a: np.ndarray, side: int, work: Record) -> tuple[float, float]:
     """D = T normal; returns the squares of its part outside the active normals, and of all of it."""
     d = work.d
     fixed, free = 0.0, 0.0
@@ -322,7 +322,7 @@ def _solve_upper(k: int, R: np.ndarray, rhs: np.ndarray, out: np.ndarray) -> Non
 
 
 @jit
-def _until_multiplier_vanishes(active: int, low: np.ndarray, high: np.ndarray, work: np.ndarray) -> tuple[float, int]:
+def _until_multiplier_vanishes(active: int, low: np.ndarray, high: np.ndarray, work: Record) -> tuple[float, int]:
     """Longest step that keeps all multipliers >= 0, and the active row that ends it; or inf, -1.
 
     The multipliers of equations may have either sign. Those that fall by rounding alone are passed over, which
@@ -341,7 +341,7 @@ def _until_multiplier_vanishes(active: int, low: np.ndarray, high: np.ndarray, w
 
 
 @jit
-def _add(n: int, active: int, p: int, side: int, u_p: float, free: float, work: np.ndarray) -> None:
+def _add(n: int, active: int, p: int, side: int, u_p: float, free: float, work: Record) -> None:
     """Make row p the last active one: a Householder reflection turns the free part of d onto one axis."""
     T, R, y, d = work.T, work.R, work.y, work.d
     length = free**0.5
@@ -371,7 +371,7 @@ def _add(n: int, active: int, p: int, side: int, u_p: float, free: float, work: 
 
 
 @jit
-def _drop(n: int, active: int, dropped: int, work: np.ndarray) -> None:
+def _drop(n: int, active: int, dropped: int, work: Record) -> None:
     """Take a row out: Givens rotations make R triangular again."""
     T, R, y = work.T, work.R, work.y
     work.side[work.row[dropped]] = 0
@@ -406,7 +406,7 @@ def _refine(
     low: np.ndarray,
     high: np.ndarray,
     x: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> None:
     """One step of iterative refinement of x and u on the active rows, from residuals of the program's own data.
 
@@ -441,7 +441,7 @@ def _refine(
 
 @jit
 def _write_multipliers(
-    m: int, active: int, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray, work: np.ndarray
+    m: int, active: int, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray, work: Record
 ) -> None:
     """Multipliers of all rows; one that rounding took below zero is zero, and counts in the dual residual."""
     for i in range(m):
@@ -460,7 +460,7 @@ def _primal_residual(
     low: np.ndarray,
     high: np.ndarray,
     x: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> tuple[float, float]:
     """Largest violation of a row, and the largest relative to the row's size and max(1, |x|)."""
     largest, relative = 0.0, 0.0
@@ -482,7 +482,7 @@ def _dual_residual(
     A: np.ndarray,
     x: np.ndarray,
     multipliers: np.ndarray,
-    work: np.ndarray,
+    work: Record,
 ) -> tuple[float, float]:
     """Largest entry of ``|P x + q + A^T multipliers|``, and relative to the largest sum of its absolute terms."""
     largest, scale = 0.0, 0.0

@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from shared_control_env.core.jit import jit, jit_inlined
+from shared_control_env.core.records import Record
 
 MAX_HOLES = 8
 """Most holes in a region."""
@@ -59,7 +60,7 @@ _TIE = 1e-9
 
 
 @jit
-def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.ndarray) -> int:
+def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: Record) -> int:
     """Constrained Delaunay triangles of a rectangle less its holes (Table I, step 1).
 
     The vertices are those of the difference polygon, points on its straight sides where holes touch included.
@@ -101,7 +102,7 @@ def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.nd
 
 
 @jit_inlined
-def _lay_sides(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.ndarray) -> None:
+def _lay_sides(region: np.ndarray, holes: np.ndarray, n_holes: int, work: Record) -> None:
     """Sides of the region, then of the holes, four each, with the free region on their left.
 
     All corners become vertices, to split coincident sides at; those inside holes do no harm.
@@ -134,7 +135,7 @@ def _offset(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> float:
 
 
 @jit
-def _vertex(work: np.ndarray, s: float, d: float) -> int:
+def _vertex(work: Record, s: float, d: float) -> int:
     """Vertex at a point, a new one unless one is there; -1 when there is no room."""
     vertices, n = work.vertices, work.n_vertices
     for i in range(n):
@@ -178,7 +179,7 @@ def _inside(sides: np.ndarray, e: int, polygon: int) -> tuple[float, float, int,
 
 
 @jit_inlined
-def _covered_parts(n_sides: int, e: int, work: np.ndarray) -> int:
+def _covered_parts(n_sides: int, e: int, work: Record) -> int:
     """Parts of a side that other holes cover, into ``work.covered`` sorted by where they begin; how many."""
     covered, cutters = work.covered, work.cutters
     count = 0
@@ -200,7 +201,7 @@ def _covered_parts(n_sides: int, e: int, work: np.ndarray) -> int:
 
 
 @jit_inlined
-def _find_pieces(n_sides: int, work: np.ndarray) -> bool:
+def _find_pieces(n_sides: int, work: Record) -> bool:
     """Pieces of all sides that lie in the region and that no hole covers; False when there is no room."""
     work.n_pieces = 0
     covered, cutters = work.covered, work.cutters
@@ -223,7 +224,7 @@ def _find_pieces(n_sides: int, work: np.ndarray) -> bool:
 
 
 @jit
-def _add_piece(work: np.ndarray, e: int, first_cut: int, last_cut: int) -> bool:
+def _add_piece(work: Record, e: int, first_cut: int, last_cut: int) -> bool:
     """Add the piece of a side between two others, or its ends (-1); False when there is no room."""
     a = _cut_vertex(work, e, first_cut, 0)
     b = _cut_vertex(work, e, last_cut, 1)
@@ -236,7 +237,7 @@ def _add_piece(work: np.ndarray, e: int, first_cut: int, last_cut: int) -> bool:
 
 
 @jit
-def _cut_vertex(work: np.ndarray, e: int, cut: int, end: int) -> int:
+def _cut_vertex(work: Record, e: int, cut: int, end: int) -> int:
     """Vertex where a side is cut by another, or at its end 0 or 1 where that is -1.
 
     The point is computed in the same way whichever of the two sides is cut: sides that are almost parallel
@@ -255,7 +256,7 @@ def _cut_vertex(work: np.ndarray, e: int, cut: int, end: int) -> int:
 
 
 @jit_inlined
-def _close_boundary(work: np.ndarray) -> bool:
+def _close_boundary(work: Record) -> bool:
     """Make the pieces the front, split at the vertices that lie on them; False when there is no room."""
     work.n_front = 0
     for i in range(work.n_pieces):
@@ -286,7 +287,7 @@ def _next_on_piece(vertices: np.ndarray, n_vertices: int, a: int, b: int) -> int
 
 
 @jit
-def _put_edge(work: np.ndarray, a: int, b: int) -> None:
+def _put_edge(work: Record, a: int, b: int) -> None:
     """Put an edge into the front; if its reverse is there the two enclose nothing, and both go."""
     front, n = work.front, work.n_front
     for i in range(n):
@@ -299,7 +300,7 @@ def _put_edge(work: np.ndarray, a: int, b: int) -> None:
 
 
 @jit_inlined
-def _apex(work: np.ndarray, a: int, b: int) -> int:
+def _apex(work: Record, a: int, b: int) -> int:
     """Visible vertex that sees an edge from its left under the largest angle, or -1.
 
     Angles are compared by their cotangents, which fall from inf to -inf as the angle grows. Visibility takes
@@ -320,7 +321,7 @@ def _apex(work: np.ndarray, a: int, b: int) -> int:
 
 
 @jit
-def _rate(work: np.ndarray, a: int, b: int) -> None:
+def _rate(work: Record, a: int, b: int) -> None:
     """Cotangent of the angle under which the first vertex of each edge of the front sees an edge, into ``work``.
 
     It is inf unless the vertex lies on the left.
@@ -363,6 +364,6 @@ def _crosses(u: np.ndarray, v: np.ndarray, p: np.ndarray, q: np.ndarray) -> bool
 
 
 @jit
-def triangulate_array(region: np.ndarray, holes: np.ndarray, n_holes: int, work: np.ndarray) -> int:
+def triangulate_array(region: np.ndarray, holes: np.ndarray, n_holes: int, work: Record) -> int:
     """:func:`triangulate` with the workspace as an array of no dimension, for calls from Python."""
     return triangulate(region, holes, n_holes, work[()])

@@ -36,15 +36,16 @@ def jit_inlined(function: F) -> F:
 
 
 def _compile(function: F, inline: str) -> F:
-    private = function.__name__.startswith("_")  # never called from Python, so it needs no entry for it
-    dispatcher = njit(
-        cache=True,
-        error_model="numpy",
-        nogil=True,
-        no_cfunc_wrapper=True,
-        no_cpython_wrapper=private,
-        inline=inline,
-    )(function)
+    options: dict[str, Any] = {
+        "cache": True,
+        "error_model": "numpy",
+        "nogil": True,
+        "inline": inline,
+        "no_cfunc_wrapper": True,
+        # A private function is never called from Python, so it needs no entry for that.
+        "no_cpython_wrapper": function.__name__.startswith("_"),
+    }
+    dispatcher: Any = njit(**options)(function)
     _drop_stale_cache(dispatcher.stats.cache_path)
     return cast(F, dispatcher)
 

@@ -118,7 +118,8 @@ class SharedControlVectorEnv(VectorEnv):
         self._mode = autoreset_mode if isinstance(autoreset_mode, AutoresetMode) else names[autoreset_mode]
         self.num_envs, self.render_mode = num_envs, render_mode
         self._limiter, self._driver = limiter, driver
-        self._scenario, self._viewer_env = scenario, None
+        self._scenario = scenario
+        self._viewer_env: SharedControlEnv | None = None
         self._settings = configuration.check(configuration.merge(scenario.default_config(), config or {}))
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
@@ -336,7 +337,7 @@ class SharedControlVectorEnv(VectorEnv):
             work(0, self.num_envs, 0)
         else:
             edges = np.linspace(0, self.num_envs, self.threads + 1).astype(int).tolist()
-            for future in [self._pool.submit(work, *edges[i : i + 2], i) for i in range(self.threads)]:
+            for future in [self._pool.submit(work, edges[i], edges[i + 1], i) for i in range(self.threads)]:
                 future.result()
         return Rollout(rewards, ends)
 

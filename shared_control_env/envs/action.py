@@ -1,45 +1,18 @@
-"""The action and its two slots: the driver's command, and the automation's authority."""
+"""The action of the bare environment."""
 
 from __future__ import annotations
 
-from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.action import ActionType
 
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, checked_slot
 from shared_control_env.envs.vehicles import EgoVehicle
 
 if TYPE_CHECKING:
     from shared_control_env.envs.shared_control import SharedControlEnv
-
-DRIVER, AUTHORITY = "driver", "authority"
-"""Names of the slots."""
-
-SLOT_SPACES: dict[str, spaces.Box] = {
-    DRIVER: spaces.Box(-1.0, 1.0, shape=(2,), dtype=np.float32),
-    AUTHORITY: spaces.Box(0.0, 1.0, shape=(1,), dtype=np.float32),
-}
-"""``driver``: desired acceleration and steering u_h,des over their limits; ``authority``: alpha_a."""
-
-_BOUNDS = {name: (float(s.low[0]), float(s.high[0]), s.shape[0]) for name, s in SLOT_SPACES.items()}
-
-
-def checked_slot(slot: str, value: Any) -> np.ndarray:
-    """A slot's value as an array within its bounds.
-
-    Raises:
-        ValueError: if the shape is wrong or an entry is not finite. Values beyond the bounds are clipped, as
-            highway-env's ContinuousAction does.
-    """
-    low, high, size = _BOUNDS[slot]
-    array = np.array(value, dtype=np.float64)
-    if array.shape != (size,) or not all(map(isfinite, array.tolist())):
-        raise ValueError(
-            f"action[{slot!r}] = {value!r} must be {size} finite number(s) in [{low:g}, {high:g}], shape ({size},)"
-        )
-    return array.clip(low, high, out=array)
 
 
 class SlotAction(ActionType):
@@ -47,7 +20,7 @@ class SlotAction(ActionType):
 
     env: SharedControlEnv
 
-    def space(self) -> spaces.Dict:
+    def space(self) -> spaces.Space:
         """Dict with a Box for each slot."""
         return spaces.Dict({slot: spaces.Box(s.low, s.high, dtype=np.float32) for slot, s in SLOT_SPACES.items()})
 

@@ -23,6 +23,9 @@ from shared_control_env.core.authority import LAWS
 from shared_control_env.core.degradation import CHANNELS
 from shared_control_env.core.fuzzy import OPERATORS
 
+LEAD_IN = 50.0
+"""Straight road behind the ego's start [m]."""
+
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -246,9 +249,15 @@ def _check_spawn(settings: Settings) -> None:
             f"[{-edge}, {edge}], within the lane"
         )
     length = settings.vehicle.length
+    road_length = sum(segment.length for segment in settings.road.segments)
     placed = [("config['ego']", settings.ego.lane, 0.0)]
     for i, vehicle in enumerate(settings.vehicles):
-        placed.append((f"config['vehicles'][{i}]", vehicle.lane, vehicle.position))
+        name = f"config['vehicles'][{i}]"
+        if not -LEAD_IN <= vehicle.position <= road_length:
+            raise ValueError(
+                f"{name}['position'] = {vehicle.position} m is not on the road, [{-LEAD_IN}, {road_length}] m"
+            )
+        placed.append((name, vehicle.lane, vehicle.position))
     for i, (name, lane, position) in enumerate(placed):
         if lane >= lanes:
             raise ValueError(f"{name}['lane'] = {lane} must lie in [0, {lanes - 1}]")

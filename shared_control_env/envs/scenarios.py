@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from shared_control_env.envs.cases import CURVE, TWO_LANE
 from shared_control_env.envs.config import merge
 from shared_control_env.envs.shared_control import SharedControlEnv
 
@@ -13,19 +14,8 @@ class TwoLaneEnv(SharedControlEnv):
 
     @classmethod
     def default_config(cls) -> dict[str, Any]:
-        """Settings of Case 1 (Section VI-B, Table VI)."""
-        return merge(
-            super().default_config(),
-            {
-                "vehicles": [
-                    {"lane": 0, "position": 38.0, "speed": 12.0},  # preceding
-                    {"lane": 1, "position": 30.0, "speed": 15.0},  # leader
-                    {"lane": 1, "position": -5.0, "speed": 12.0},  # follower
-                ],
-                # delta_f = delta_des + 0.3 (k - 10) / 20 for 10 <= k <= 30, then + 0.3.
-                "faults": [{"channel": "steering", "onset": 0.5, "ramp": 1.0, "size": 0.3}],
-            },
-        )
+        """Settings of Case 1."""
+        return merge(super().default_config(), TWO_LANE.settings)
 
 
 class CurveEnv(SharedControlEnv):
@@ -33,15 +23,5 @@ class CurveEnv(SharedControlEnv):
 
     @classmethod
     def default_config(cls) -> dict[str, Any]:
-        """Settings of Case 2 (Section VI-C)."""
-        return merge(
-            super().default_config(),
-            {
-                "road": {"segments": [{"length": 300.0, "curvature": 1.0 / 60.0}]},
-                "ego": {"speed": 12.0},
-                "vehicles": [{"lane": 0, "position": 15.0, "speed": 12.0}],
-                # a_f = a_des + 3 (k - 5) / 5 for 5 < k <= 10, then + 3.
-                "faults": [{"channel": "acceleration", "onset": 0.25, "ramp": 0.25, "size": 3.0}],
-                "screen_height": 600,
-            },
-        )
+        """Settings of Case 2."""
+        return merge(super().default_config(), CURVE.settings)

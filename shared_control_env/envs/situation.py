@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from highway_env.vehicle.kinematics import Vehicle
 
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, SPEED, pack
 from shared_control_env.core.road import curvature_at, point_at, reference_line
 from shared_control_env.core.traffic import follow_lane
-from shared_control_env.envs.config import Settings, fault_rows, parameters_of
+from shared_control_env.envs.config import LEAD_IN, Settings, fault_rows, parameters_of
 
-LEAD_IN = 50.0
-"""Straight road behind the ego's start [m]."""
+TRAFFIC_BODY = (5.0, 2.0)
+"""Length and width of highway-env's vehicles [m]."""
 
 
 class Situation(NamedTuple):
@@ -44,6 +43,6 @@ def start_of(settings: Settings) -> Situation:
     traffic = np.zeros((len(settings.vehicles), 8))
     for row, vehicle in zip(traffic, settings.vehicles, strict=True):
         row[:3] = point_at(line, vehicle.position, settings.lane_centre(vehicle.lane))
-        row[SPEED], row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.speed, Vehicle.LENGTH, Vehicle.WIDTH
+        row[SPEED], row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.speed, *TRAFFIC_BODY
         follow_lane(row, line, 0.0)
     return Situation(line, fault_rows(settings), pack(parameters_of(settings)), ego, traffic)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import load_env_creator
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -18,10 +19,9 @@ from shared_control_env.core.info import INFO
 from shared_control_env.core.observation import FEATURES
 from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, SIGNALS
 from shared_control_env.envs import config as configuration
-from shared_control_env.envs.action import AUTHORITY, DRIVER, SLOT_SPACES
-from shared_control_env.envs.scenarios import CurveEnv, TwoLaneEnv
-from shared_control_env.envs.shared_control import SharedControlEnv
+from shared_control_env.envs.cases import CURVE, TWO_LANE, Case
 from shared_control_env.envs.situation import start_of
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, space_of
 from shared_control_env.vector import kernel
 from shared_control_env.vector.records import (
     DISABLED,
@@ -79,7 +79,7 @@ class SharedControlVectorEnv(VectorEnv):
     Environment i gives what the single environment gives for the same actions; the functions are the same.
 
     Args:
-        scenario: class of the single environment.
+        case: the scenario.
         num_envs: N.
         config: changes to the scenario's settings.
         render_mode: ``rgb_array`` or ``human``; environment 0 is drawn, by the single environment's viewer.
@@ -99,7 +99,7 @@ class SharedControlVectorEnv(VectorEnv):
 
     def __init__(
         self,
-        scenario: type[SharedControlEnv],
+        case: Case,
         num_envs: int = 1,
         config: dict[str, Any] | None = None,
         render_mode: str | None = None,
@@ -118,9 +118,10 @@ class SharedControlVectorEnv(VectorEnv):
         self._mode = autoreset_mode if isinstance(autoreset_mode, AutoresetMode) else names[autoreset_mode]
         self.num_envs, self.render_mode = num_envs, render_mode
         self._limiter, self._driver = limiter, driver
-        self._scenario = scenario
-        self._viewer_env: SharedControlEnv | None = None
-        self._settings = configuration.check(configuration.merge(scenario.default_config(), config or {}))
+        self._case = case
+        self._viewer_env: Any = None
+        default = configuration.merge(configuration.plain(configuration.Settings()), case.settings)
+        self._settings = configuration.check(configuration.merge(default, config or {}))
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
         wanted = threads or os.cpu_count() or 1
@@ -137,14 +138,8 @@ class SharedControlVectorEnv(VectorEnv):
     def _define_spaces(self) -> None:
         """Spaces of the open slots, once."""
         bound = {DRIVER: self._driver, AUTHORITY: self._limiter}
-        rest = {slot: space for slot, space in SLOT_SPACES.items() if not bound[slot]}
-        self._open = tuple(rest)
-        single: spaces.Space = spaces.Discrete(1)
-        if len(rest) == 1:
-            (box,) = rest.values()
-            single = spaces.Box(box.low, box.high, dtype=np.float32)
-        elif rest:
-            single = spaces.Dict({slot: spaces.Box(s.low, s.high, dtype=np.float32) for slot, s in rest.items()})
+        self._open = tuple(slot for slot in SLOT_SPACES if not bound[slot])
+        single = space_of(self._open)
         self.single_action_space = single
         self.single_observation_space = spaces.Box(-1.0, 1.0, (len(FEATURES),), dtype=np.float32)
         self.action_space = batch_space(single, self.num_envs)
@@ -295,7 +290,8 @@ class SharedControlVectorEnv(VectorEnv):
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Draw environment 0; in ``rgb_array`` mode a tuple of its frame."""
         if self._viewer_env is None:
-            self._viewer_env = self._scenario(self.config, render_mode=self.render_mode)
+            make: Any = load_env_creator(self._case.environment)
+            self._viewer_env = make(self.config, render_mode=self.render_mode)
         batch = self._batch
         k = int(batch.scenes[0]["k"])
         self._viewer_env.show(batch.states[0], batch.traffic[0], batch.scenes[0], batch.signals[0], self._path[: k + 1])
@@ -434,9 +430,9 @@ def _batched(records: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
 
 def two_lane(num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
     """``SharedControl/TwoLane-v0``, N times; see :class:`SharedControlVectorEnv`."""
-    return SharedControlVectorEnv(TwoLaneEnv, num_envs, **options)
+    return SharedControlVectorEnv(TWO_LANE, num_envs, **options)
 
 
 def curve(num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
     """``SharedControl/Curve-v0``, N times; see :class:`SharedControlVectorEnv`."""
-    return SharedControlVectorEnv(CurveEnv, num_envs, **options)
+    return SharedControlVectorEnv(CURVE, num_envs, **options)

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from shared_control_env.core import single
-from shared_control_env.envs.action import AUTHORITY
+from shared_control_env.envs.slots import AUTHORITY
 from shared_control_env.wrappers.slots import SlotWrapper
 
 

@@ -6,17 +6,15 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from gymnasium import spaces
 
-from shared_control_env.envs.action import SLOT_SPACES
 from shared_control_env.envs.shared_control import SharedControlEnv
+from shared_control_env.envs.slots import SLOT_SPACES, space_of
 
 
 class SlotWrapper(gym.ActionWrapper):
     """Base of the wrappers that decide one slot of the action at every step.
 
-    The remaining action is a dict while two slots or more are open, that slot's own Box when one is, and
-    ``Discrete(1)``, to go on, when none is.
+    The remaining action is the open slot's own Box, or ``Discrete(1)``, to go on, when none is open.
 
     Args:
         env: an environment whose slot is open.
@@ -34,12 +32,8 @@ class SlotWrapper(gym.ActionWrapper):
         self._inner_slots = open_slots(env)
         if slot not in self._inner_slots:
             raise ValueError(f"slot {slot!r} of {env} is bound already; open are {list(self._inner_slots)}")
-        rest = {name: SLOT_SPACES[name] for name in self._inner_slots if name != slot}
-        self.open_slots = tuple(rest)
-        self.action_space: spaces.Space = spaces.Discrete(1)
-        if rest:
-            (space,) = rest.values()
-            self.action_space = spaces.Box(space.low, space.high, dtype=np.float32)
+        self.open_slots = tuple(name for name in self._inner_slots if name != slot)
+        self.action_space = space_of(self.open_slots)
 
     @property
     def shared(self) -> SharedControlEnv:

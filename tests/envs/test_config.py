@@ -32,6 +32,7 @@ BAD = [
     ({"faults": [{"channel": "steering", "onset": 0.5, "ramp": 1.0, "size": 0.3, "onst": 1}]}, "'onset'"),
     ({"vehicles": [{"lane": 0, "position": 2.0, "speed": 10.0}]}, "overlaps"),
     ({"vehicles": [{"lane": 5, "position": 20.0, "speed": 10.0}]}, r"\['lane'\] = 5 must lie in \[0, 1\]"),
+    ({"vehicles": [{"lane": 1, "position": -80.0, "speed": 10.0}]}, "not on the road"),
     ({"ego": {"lane": 3}}, r"\['lane'\] = 3"),
     ({"ego": {"lateral_offset": 3.0}}, "within the lane"),
     ({"road": {"segments": [{"length": 600.0, "curvature": 1 / 60}]}}, "meet itself"),

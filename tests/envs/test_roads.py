@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+from highway_env.vehicle.kinematics import Vehicle
 
 from shared_control_env.core.road import locate, point_at, reference_line
 from shared_control_env.envs import CurveEnv
 from shared_control_env.envs.roads import road_network
+from shared_control_env.envs.situation import TRAFFIC_BODY
 
 SEGMENTS = [(60.0, 0.0), (200.0, 1 / 60), (120.0, -1 / 40), (50.0, 0.0)]
 LINE = reference_line(SEGMENTS, lead_in=50.0)
@@ -32,6 +34,10 @@ def test_local_coordinates_agree():
             longitudinal, lateral = lane.local_coordinates(np.array([x, y]))
             assert longitudinal == pytest.approx(s - row[0], abs=1e-8)
             assert lateral == pytest.approx(offset, abs=1e-8)
+
+
+def test_bodies_are_highway_envs():
+    assert (Vehicle.LENGTH, Vehicle.WIDTH) == TRAFFIC_BODY
 
 
 def test_traffic_follows_its_lane_at_constant_speed():

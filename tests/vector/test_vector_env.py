@@ -1,5 +1,8 @@
 """The vectorised environment gives what the single one gives, and follows Gymnasium's vector interface."""
 
+import subprocess
+import sys
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -9,7 +12,7 @@ import shared_control_env  # noqa: F401
 from shared_control_env.core.authority import LAWS
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.registration import ENVIRONMENTS
-from shared_control_env.vector import SharedControlVectorEnv
+from shared_control_env.vector.environment import two_lane
 from shared_control_env.wrappers import DriverModel
 
 IDS = list(ENVIRONMENTS)
@@ -314,12 +317,22 @@ def test_refused(call, message):
 )
 def test_wrong_construction(options, message):
     with pytest.raises(ValueError, match=message):
-        SharedControlVectorEnv(TwoLaneEnv, **options)
+        two_lane(**options)
 
 
 def test_stepping_before_a_reset():
     with pytest.raises(ValueError, match="reset"):
         gym.make_vec(TWO_LANE, num_envs=2).step(np.zeros((2, 2)))
+
+
+def test_starts_without_highway_env():
+    code = (
+        "import sys, gymnasium as gym, shared_control_env\n"
+        "gym.make_vec('SharedControl/TwoLane-v0', num_envs=2).reset(seed=0)\n"
+        "print([name for name in ('highway_env', 'pygame', 'pandas') if name in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
 
 
 def test_memory_of_an_environment():

@@ -14,7 +14,8 @@ from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_COMPILED_SOURCES = (Path(__file__).parent, Path(__file__).parent.parent / "vector")
+_PACKAGE = Path(__file__).parent.parent
+_COMPILED_SOURCES = ("core/*.py", "vector/kernel.py", "vector/records.py")
 
 
 def jit(function: F) -> F:
@@ -57,7 +58,7 @@ def _drop_stale_cache(directory: str) -> None:
     Numba compares only a function's own file, yet inlines what it calls: after a change in
     one file the callers in others would silently keep the old equation.
     """
-    sources = sorted(path for folder in _COMPILED_SOURCES for path in folder.glob("*.py"))
+    sources = sorted(path for pattern in _COMPILED_SOURCES for path in _PACKAGE.glob(pattern))
     digest = sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
     stamp = Path(directory) / "shared_control_env.sha256"
     if stamp.is_file() and stamp.read_text() == digest:
@@ -83,7 +84,7 @@ class _ColdCompileNotice(event.Listener):
             self.said = True
             print(
                 "shared_control_env: compiling the numerical core for this machine, once "
-                "(under a minute); later runs read it from numba's cache.",
+                "(about a minute); later runs read it from numba's cache.",
                 file=sys.stderr,
                 flush=True,
             )

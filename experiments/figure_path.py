@@ -36,14 +36,25 @@ def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
         for k in range(0, len(table), EVERY):
             _draw_moment(first, line, table.iloc[k], label=k == 0)
         first.plot(table["x"], table["y_cartesian"], color="k", lw=1.2, label="ego's path")
-        first.set_title(f"Case {case}: path, safe area and prediction every {EVERY} steps (law of Eq. 10)")
+        first.set_title(f"Case {case}: safe area and prediction, law of Eq. 10")
         _draw_road(second, line, table["s"].max() + 30.0)
-        for run, signals in runs.items():
-            if run.case == case and run.preset == "graded":
-                who = run.law if run.driver else "automation_alone"
-                second.plot(
-                    signals["x"], signals["y_cartesian"], color=style.LAW_COLOURS[who], label=who.replace("_", " ")
-                )
+        shown = [run for run in runs if run.case == case and run.preset == "graded"]
+        # Paths that coincide stay visible: wide ones first, the paper's law last and dashed.
+        for i, run in enumerate(sorted(shown, key=lambda run: run == main)):
+            signals = runs[run]
+            who = run.law if run.driver else "automation_alone"
+            ended = bool(signals["terminated"].iloc[-1])
+            second.plot(
+                signals["x"],
+                signals["y_cartesian"],
+                "--" if run == main else "-",
+                color=style.LAW_COLOURS[who],
+                lw=4.0 - 0.6 * i,
+                marker="X" if ended else None,
+                markevery=[len(signals) - 1],
+                ms=9,
+                label=who.replace("_", " ") + (f" (ends at {signals['t'].iloc[-1]:.1f} s)" if ended else ""),
+            )
         second.set_title(f"Case {case}: path under every law")
         for axis in (first, second):
             axis.set(xlabel="x [m]", ylabel="y [m], to the left")

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from time import perf_counter
 from typing import Any, TypeVar, cast
 
 from numba import njit
@@ -74,23 +75,26 @@ def _drop_stale_cache(directory: str) -> None:
 
 
 class _ColdCompileNotice(event.Listener):
-    """Say once on stderr that the first run compiles, so that it does not look hung."""
+    """Say on stderr that something is compiled for the first time, once for all that is compiled in a row."""
 
-    said = False
+    quiet_since = -float("inf")
 
     def on_start(self, event: Any) -> None:
         function = event.data["dispatcher"].py_func
-        if not self.said and function.__module__.startswith("shared_control_env"):
-            self.said = True
+        pause = perf_counter() - self.quiet_since
+        if pause > 5.0 and function.__module__.startswith("shared_control_env"):
             print(
-                "shared_control_env: compiling the numerical core for this machine, once "
-                "(about a minute); later runs read it from numba's cache.",
+                "shared_control_env: compiling the numerical core for this use and machine, once "
+                "(up to a minute); later runs read it from numba's cache.",
                 file=sys.stderr,
                 flush=True,
             )
 
+        self.quiet_since = perf_counter()
+
     def on_end(self, event: Any) -> None:
-        """Nothing is due when a compilation ends."""
+        """Note that a compilation has ended just now."""
+        self.quiet_since = perf_counter()
 
 
 event.register("numba:compile", _ColdCompileNotice())

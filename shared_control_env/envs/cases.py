@@ -38,7 +38,7 @@ CURVE = Case(
         "vehicles": [{"lane": 0, "position": 15.0, "speed": 12.0}],
         # a_f = a_des + 3 (k - 5) / 5 for 5 < k <= 10, then + 3.
         "faults": [{"channel": "acceleration", "onset": 0.25, "ramp": 0.25, "size": 3.0}],
-        "screen_height": 600,
+        "screen_height": 632,
     },
     environment="shared_control_env.envs.scenarios:CurveEnv",
 )

@@ -118,7 +118,7 @@ class Settings(_Section):
     policy_frequency: core.Count = 20  # [Hz]
     other_vehicles_type: str = "shared_control_env.envs.vehicles.LaneFollower"
     screen_width: core.Count = 1000  # [px]
-    screen_height: core.Count = 420  # [px]
+    screen_height: core.Count = 452  # [px]
     centering_position: Annotated[list[float], MinLen(2)] = [0.3, 0.5]
     scaling: core.Positive = 11.0  # [px/m]
     render_agent: bool = True
@@ -133,7 +133,7 @@ class Settings(_Section):
     faults: list[FaultSettings] = []
     task: _Task = _Task()
     authority: AuthoritySettings = AuthoritySettings()
-    law: _Law = _Law()
+    law_tolerances: _Law = _Law()
     lateral_risk: _Lateral = _Lateral()
     longitudinal_risk: _Longitudinal = _Longitudinal()
     safe_area: _SafeArea = _SafeArea()
@@ -161,6 +161,8 @@ def merge(config: dict[str, Any], changes: Mapping[str, Any], path: str = "confi
     Raises:
         ValueError: for an unknown key, naming it and the nearest valid one.
     """
+    if not isinstance(changes, Mapping):
+        raise ValueError(f"{path} = {changes!r} must be a dict with keys among {sorted(config)}")
     merged = dict(config)
     for key, value in changes.items():
         if key not in config:
@@ -198,7 +200,8 @@ def check(config: Mapping[str, Any]) -> Settings:
 
 def _explain(error: ValidationError) -> str:
     """Pydantic's first error in the words of this module."""
-    first = error.errors()[0]
+    # An unknown key comes first: it may be the misspelt one that is missing.
+    first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
     path = "config" + "".join(f"[{key!r}]" for key in first["loc"])
     if first["type"] == "extra_forbidden":
         valid: Any = Settings
@@ -212,7 +215,8 @@ def _explain(error: ValidationError) -> str:
     text = f"{path} = {first['input']!r}: {first['msg'][0].lower()}{first['msg'][1:]}"
     if first["type"] == "literal_error":
         names = [name for name in first["ctx"]["expected"].split("'") if name.strip(" ,or")]
-        text += f"; {_nearest(first['input'], names)}"
+        near = difflib.get_close_matches(str(first["input"]), names, n=1, cutoff=0.5)
+        text += f"; did you mean {near[0]!r}?" if near else ""
     return text
 
 
@@ -301,7 +305,7 @@ def parameters_of(settings: Settings) -> core.Parameters:
         safe_area=core.SafeAreaParameters(**values(settings.safe_area)),
         lateral=core.LateralRiskParameters(**values(settings.lateral_risk)),
         longitudinal=core.LongitudinalRiskParameters(**longitudinal),
-        law=core.LawParameters(**values(settings.law)),
+        law=core.LawParameters(**values(settings.law_tolerances)),
         lag=core.DriverLagParameters(**values(settings.driver_lag)),
         reward=core.RewardParameters(**values(settings.reward)),
         task=core.TaskParameters(

@@ -15,11 +15,11 @@ from shared_control_env.core.safe_area import REACHED
 if TYPE_CHECKING:
     from shared_control_env.envs.shared_control import SharedControlEnv
 
-PANEL_HEIGHT = 160
+PANEL_HEIGHT = 192
 """Height of the gauges' panel under the road [px]."""
 
 BACKGROUND, INK, FAINT = (250, 250, 250), (30, 30, 30), (205, 205, 205)
-AUTOMATION, DEGRADED, DRIVER = (0, 110, 200), (215, 45, 45), (20, 140, 60)
+AUTOMATION, DEGRADED, LIMITED, DRIVER = (0, 110, 200), (215, 45, 45), (150, 90, 200), (20, 140, 60)
 SAFE, BLOCKED = (70, 200, 120, 70), (230, 150, 40, 90)
 PREDICTION, PATH = (0, 230, 60), (255, 210, 0)
 RISK, AUTHORITY = (220, 110, 0), (90, 60, 190)
@@ -126,7 +126,7 @@ class SharedControlViewer(EnvViewer):
             (
                 ("acceleration", "m/s2", float(limits["a_max"]), 1.0),
                 # A bar to the left is steering to the left, which is positive.
-                ("steering", "deg", -float(limits["delta_max"]), 180.0 / np.pi),
+                ("steering", "deg left", -float(limits["delta_max"]), 180.0 / np.pi),
             )
         ):
             left = (0.37 + 0.32 * channel) * width
@@ -134,11 +134,12 @@ class SharedControlViewer(EnvViewer):
                 (
                     ("automation", "u_a_des", AUTOMATION),
                     ("degraded", "u_a_f", DEGRADED),
+                    ("limited", "u_a_act", LIMITED),
                     ("driver", "u_h_act", DRIVER),
                 )
             ):
                 value = float(signals[key][channel])
-                label = f"{title}, {name}: {value * shown:+.2f} {unit}"
+                label = f"{title}, {name}: {round(value * shown, 2) + 0.0:+.2f} {unit}"
                 self._bar(label, value / bound, (left, top + 42 + 36 * i), 0.3 * width, colour, True)
 
     def _bar(

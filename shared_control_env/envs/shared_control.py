@@ -54,6 +54,8 @@ class SharedControlEnv(AbstractEnv):
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
 
     def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode = {render_mode!r} must be one of {self.metadata['render_modes']} or None")
         # highway-env updates metadata, which is the class's own dict, at every reset.
         self.metadata = dict(type(self).metadata)
         self.scene = np.zeros((), SCENE)
@@ -117,6 +119,8 @@ class SharedControlEnv(AbstractEnv):
             ValueError: for unknown options or wrong settings.
         """
         gym.Env.reset(self, seed=seed)
+        if options is not None and not isinstance(options, dict):
+            raise ValueError(f"options = {options!r} must be a dict")
         unknown = set(options or {}) - {"config"}
         if unknown:
             raise ValueError(f"options has the unknown key(s) {sorted(unknown)}; valid is 'config'")

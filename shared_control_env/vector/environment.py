@@ -112,6 +112,12 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"num_envs = {num_envs} must be at least 1")
         if threads is not None and threads < 1:
             raise ValueError(f"threads = {threads} must be at least 1, or None for one a core")
+        for name, value in (("limiter", limiter), ("driver", driver)):
+            if not isinstance(value, bool):
+                raise ValueError(
+                    f"{name} = {value!r} must be True or False; for a driver of your own use DriverModel on the single "
+                    "environment, or its commands as actions"
+                )
         names = {mode.name.lower(): mode for mode in AutoresetMode}
         if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in names:
             raise ValueError(f"autoreset_mode = {autoreset_mode!r} must be an AutoresetMode or one of {sorted(names)}")
@@ -276,12 +282,14 @@ class SharedControlVectorEnv(VectorEnv):
             steps: how many, in every environment.
 
         Raises:
-            ValueError: if a slot of the action is open.
+            ValueError: if a slot of the action is open, steps is below 1, or there was no reset.
         """
         if self._open:
             raise ValueError(f"rollout() needs limiter=True and driver=True; open are {list(self._open)}")
+        if steps < 1:
+            raise ValueError(f"steps = {steps} must be at least 1")
         if not self._started:
-            self.reset()
+            raise ValueError("rollout() needs a reset() first")
         out = self._outputs()
         result = self._advance(steps, self._everyone, self._nobody, self._no_actions, out)
         self._finish(out)

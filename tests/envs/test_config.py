@@ -30,6 +30,7 @@ BAD = [
     ({"faults": [{"channel": "steering", "onset": -0.5, "ramp": 1.0, "size": 0.3}]}, "onset"),
     ({"faults": [{"channel": "steering", "onset": 0.5, "ramp": 1.0}]}, r"\['size'\] is missing"),
     ({"faults": [{"channel": "steering", "onset": 0.5, "ramp": 1.0, "size": 0.3, "onst": 1}]}, "'onset'"),
+    ({"faults": [{"channel": "steering", "onst": 0.5, "ramp": 1.0, "size": 0.3}]}, "did you mean 'onset'"),
     ({"vehicles": [{"lane": 0, "position": 2.0, "speed": 10.0}]}, "overlaps"),
     ({"vehicles": [{"lane": 5, "position": 20.0, "speed": 10.0}]}, r"\['lane'\] = 5 must lie in \[0, 1\]"),
     ({"vehicles": [{"lane": 1, "position": -80.0, "speed": 10.0}]}, "not on the road"),
@@ -114,6 +115,15 @@ def test_actions_beyond_the_bounds_are_clipped():
     info = env.step({"driver": np.array([7.0, -9.0]), "authority": np.array([2.0])})[4]
     np.testing.assert_allclose(info["u_h_des"], [5.0, -np.pi / 6])
     assert info["alpha_a"] == 1.0
+
+
+def test_wrong_types_of_the_outer_arguments():
+    with pytest.raises(ValueError, match="config = 'none' must be a dict"):
+        TwoLaneEnv("none")
+    with pytest.raises(ValueError, match="render_mode = 'rgb' must be one of"):
+        TwoLaneEnv(render_mode="rgb")
+    with pytest.raises(ValueError, match="options = 'x' must be a dict"):
+        TwoLaneEnv().reset(options="x")
 
 
 def test_unknown_options():

@@ -1,6 +1,7 @@
 """The paper's cases: expected key figures, symmetry of the closed loop, verdicts that come from the runs."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -105,6 +106,9 @@ def test_claims_read_as_markdown_and_json(runs):
     rows = claims.judge(runs)
     page = claims.as_markdown(rows, {"seed": 0})
     assert all(row["claim"] in page for row in rows)
+    table_lines = [line for line in page.splitlines() if line.startswith("|")]
+    assert len(table_lines) == len(rows) + 2 * 3
+    assert {len(re.findall(r"(?<!\\)\|", line)) for line in table_lines} == {7}
     assert json.loads(claims.as_json(rows, {"seed": 0}))["claims"] == rows
 
 

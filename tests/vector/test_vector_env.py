@@ -295,6 +295,7 @@ def test_a_bad_action_names_its_environment_and_moves_nothing(bad):
         (lambda env: env.reset(options={"reset_mask": np.zeros(3, dtype=bool)}), "names no environment"),
         (lambda env: env.reset(options={"config": {"duratoin": 1.0}}), "duration"),
         (lambda env: env.unwrapped.rollout(3), "open are"),
+        (lambda env: gym.make_vec(TWO_LANE, num_envs=2, driver=True).unwrapped.rollout(3), "needs a reset"),
     ],
 )
 def test_refused(call, message):
@@ -309,6 +310,7 @@ def test_refused(call, message):
     [
         ({"num_envs": 0}, "num_envs = 0"),
         ({"threads": 0}, "threads = 0"),
+        ({"driver": object()}, "must be True or False"),
         ({"autoreset_mode": "sometimes"}, "one of"),
         ({"config": {"other_vehicles_type": "highway_env.vehicle.behavior.IDMVehicle"}}, "not in the kernel"),
         ({"config": {"vehicles": [{"lane": 1, "position": 9.0 * i, "speed": 9.0} for i in range(9)]}}, "0 to 8"),

@@ -173,7 +173,8 @@ class SharedControlEnv(AbstractEnv):
     def _perceive_and_plan(self) -> None:
         """Perceive the scene, find its safe area, let the automation decide, degrade it, assess the risk."""
         p, scene, signals, state = self.parameters, self.scene, self.signals, self.vehicle.array
-        self._path[self.steps] = state[:2]
+        # An episode may be driven on past its end; the picture's path stays within the duration.
+        self._path[min(self.steps, len(self._path) - 1)] = state[:2]
         count = single.sense(self.steps, state, self.traffic, self.line, p, scene, self._corners)
         start, end, low, high = scene["region"].tolist()
         single.search(triangulate(start, end, low, high, self._corners[:count]), p, scene)

@@ -232,6 +232,14 @@ def test_episode_ends_by_whole_steps():
     assert ends == [(False, False)] * 5 + [(False, True)]
 
 
+def test_driving_on_past_the_end_stays_truncated():
+    env = gym.make(IDS[0], config={"duration": 0.1, "faults": []}, render_mode="rgb_array")
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(2, dtype=np.float32))[3] for _ in range(5)]
+    assert ends == [False, True, True, True, True]
+    assert env.render().any()
+
+
 def test_leaving_the_lane_is_counted_and_leaving_the_road_ends():
     env = TwoLaneEnv({"faults": [], "authority": {"law": "driver_only"}, "vehicles": []})
     env.reset(seed=0)

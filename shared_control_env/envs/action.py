@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.action import ActionType
 
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, checked_slot
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, checked_slot, space_of
 from shared_control_env.envs.vehicles import EgoVehicle
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ class SlotAction(ActionType):
 
     def space(self) -> spaces.Space:
         """Dict with a Box for each slot."""
-        return spaces.Dict({slot: spaces.Box(s.low, s.high, dtype=np.float32) for slot, s in SLOT_SPACES.items()})
+        return space_of(tuple(SLOT_SPACES))
 
     @property
     def vehicle_class(self) -> type[EgoVehicle]:

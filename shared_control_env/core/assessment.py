@@ -41,10 +41,9 @@ def predict_ego(scene: Record, u_f: np.ndarray, line: np.ndarray, p: Parameters,
         signals: record of :data:`records.SIGNALS`; ``prediction`` and ``prediction_road`` are written.
     """
     state = scene.state
-    after = np.empty(6)
-    implicit_step(state, u_f[0], u_f[1], 0.0, p.task.dt, p.vehicle, after)
     xi = signals.prediction
-    ctra(state[0], state[1], state[2], state[V_X], u_f[0], after[R], p.task.tau_p, xi)
+    implicit_step(state, u_f[0], u_f[1], 0.0, p.task.dt, p.vehicle, xi)
+    ctra(state[0], state[1], state[2], state[V_X], u_f[0], xi[R], p.task.tau_p, xi)
     s, d, _, _ = locate(line, xi[0], xi[1])
     signals.prediction_road[0], signals.prediction_road[1] = s, d
 

@@ -23,9 +23,8 @@ from shared_control_env.core.reward import reward_terms, weighted_sum
 @jit_inlined
 def clear_memory(memory: Record) -> None:
     """State of a loop that has not run: no command, full authority on display."""
-    memory.u_h_act[:] = 0.0
-    memory.u_h_des[:] = 0.0
-    memory.u[:] = 0.0
+    for i in range(2):
+        memory.u_h_act[i] = memory.u_h_des[i] = memory.u[i] = 0.0
     memory.alpha_a = 1.0
     memory.in_lane = True
     memory.lane_departures = 0
@@ -45,16 +44,24 @@ def clear_signals(signals: Record) -> None:
         signals.prediction_road,
     ):
         vector[0], vector[1] = 0.0, 0.0
-    signals.prediction[:] = 0.0
+    for i in range(6):
+        signals.prediction[i] = 0.0
     signals.r_x, signals.r_y, signals.alpha_a = 0.0, 0.0, 1.0
     signals.status, signals.iterations, signals.residual = 0, 0, 0.0
+
+
+@jit
+def clear_sequence(U: np.ndarray) -> None:
+    """A sequence of commands that does nothing, shape (n, 2)."""
+    for j in range(U.shape[0]):
+        U[j, 0], U[j, 1] = 0.0, 0.0
 
 
 @jit_inlined
 def clear_automation(memory: Record) -> None:
     """State of an automation that has not run."""
-    memory.U[:] = 0.0
-    memory.u_a_des[:] = 0.0
+    clear_sequence(memory.U)
+    memory.u_a_des[0], memory.u_a_des[1] = 0.0, 0.0
     memory.failures = 0
 
 
@@ -77,7 +84,7 @@ def automate(scene: Record, p: Parameters, memory: Record, work: Record) -> tupl
     status, done, residual, _ = automation_mpc.solve(memory.U, scene, p, iterations, work)
     if status == automation_mpc.FAILED:
         memory.failures += 1
-        memory.U[:] = 0.0
+        clear_sequence(memory.U)
     else:
         memory.u_a_des[0], memory.u_a_des[1] = memory.U[0, 0], memory.U[0, 1]
         automation_mpc.shift(memory.U, p.automation.H_c)

@@ -100,7 +100,9 @@ def centroid_min_max(r_x: float, r_y: float) -> float:
     Returns:
         Centre of gravity, before :func:`authority` rescales it.
     """
-    strength = np.zeros(7)
+    strength = np.empty(7)
+    for term in range(7):
+        strength[term] = 0.0
     for i in range(5):
         for j in range(5):
             rule = RULES[i, j]

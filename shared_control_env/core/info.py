@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.core.degradation import ONSET
-from shared_control_env.core.jit import jit, jit_inlined
+from shared_control_env.core.jit import jit
 from shared_control_env.core.records import MAX_CHAIN, Record
 from shared_control_env.core.reward import TERMS
 
@@ -56,7 +56,7 @@ INFO = np.dtype(
 """Signals of the step just taken, from its start (k) on; from ``speed`` on, what it led to."""
 
 
-@jit_inlined
+@jit
 def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: int, info: Record) -> None:
     """Copy the signals of a scene's time step.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -10,7 +11,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, types
 from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -48,8 +49,21 @@ def _compile(function: F, inline: str) -> F:
         "no_cpython_wrapper": function.__name__.startswith("_"),
     }
     dispatcher: Any = njit(**options)(function)
+    _ignore_literals(dispatcher)
     _drop_stale_cache(dispatcher.stats.cache_path)
     return cast(F, dispatcher)
+
+
+def _ignore_literals(dispatcher: Any) -> None:
+    """Have compiled callers share one specialisation for a constant and a variable of the same type."""
+    call_template = dispatcher.get_call_template
+
+    def get_call_template(args: Any, kws: Any) -> Any:
+        return call_template(
+            [types.unliteral(arg) for arg in args], {name: types.unliteral(arg) for name, arg in kws.items()}
+        )
+
+    dispatcher.get_call_template = get_call_template
 
 
 @cache
@@ -74,14 +88,25 @@ def _drop_stale_cache(directory: str) -> None:
         return
 
 
-class _ColdCompileNotice(event.Listener):
-    """Say on stderr that something is compiled for the first time, once for all that is compiled in a row."""
+class _Compilation(event.Listener):
+    """Say on stderr that something is compiled for the first time, once for all that is compiled in a row.
+
+    The garbage collector rests meanwhile: numba makes millions of objects that live until the end, and looking
+    through them again and again takes a tenth of the time.
+    """
 
     quiet_since = -float("inf")
+    depth = 0
+    collecting = False
 
     def on_start(self, event: Any) -> None:
+        """Note that a compilation begins, perhaps within another."""
         function = event.data["dispatcher"].py_func
         pause = perf_counter() - self.quiet_since
+        if self.depth == 0:
+            self.collecting = gc.isenabled()
+            gc.disable()
+        self.depth += 1
         if pause > 5.0 and function.__module__.startswith("shared_control_env"):
             print(
                 "shared_control_env: compiling the numerical core for this use and machine, once "
@@ -89,12 +114,14 @@ class _ColdCompileNotice(event.Listener):
                 file=sys.stderr,
                 flush=True,
             )
-
         self.quiet_since = perf_counter()
 
     def on_end(self, event: Any) -> None:
         """Note that a compilation has ended just now."""
+        self.depth -= 1
+        if self.depth == 0 and self.collecting:
+            gc.enable()
         self.quiet_since = perf_counter()
 
 
-event.register("numba:compile", _ColdCompileNotice())
+event.register("numba:compile", _Compilation())

@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 
-from shared_control_env.core.jit import jit_inlined
+from shared_control_env.core.jit import jit
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT, Record
 from shared_control_env.core.road import curvature_at
@@ -44,7 +44,7 @@ FEATURES: tuple[tuple[str, float], ...] = (
 _SCALES = np.array([scale for _, scale in FEATURES])
 
 
-@jit_inlined
+@jit
 def observe(scene: Record, memory: Record, line: np.ndarray, p: Parameters, out: np.ndarray) -> None:
     """Write the observation of a scene: :data:`FEATURES` over their scales, clipped.
 

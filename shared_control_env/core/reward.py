@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.jit import jit_inlined
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.parameters import Parameters, RewardParameters
 from shared_control_env.core.records import Record
 
@@ -18,7 +18,7 @@ COMFORT_LATERAL = 3.0
 """Lateral acceleration that counts 1 [m/s^2]; ISO 11270."""
 
 
-@jit_inlined
+@jit
 def reward_terms(
     previous_s: float,
     scene: Record,

@@ -147,9 +147,10 @@ def adjacency(triangles: np.ndarray) -> np.ndarray:
         Integer array, shape (m, 3); the table's matrix D(i, j) is 1 where j is in row i.
     """
     n = triangles.shape[0]
-    neighbours = np.full((n, 3), -1)
+    neighbours = np.empty((n, 3), dtype=np.int64)
     for i in range(n):
         for edge in range(3):
+            neighbours[i, edge] = -1
             for j in range(n):
                 if _same_edge(triangles, i, edge, j) >= 0:
                     neighbours[i, edge] = j
@@ -244,10 +245,11 @@ def _search(
         triangle in which the front line is reached and its edge there, or -1.
     """
     n = triangles.shape[0]
-    distance = np.full(n, np.inf)
-    parent, entry = np.full(n, -1), np.full(n, -1)
-    at = np.zeros((n, 2))
-    done = np.zeros(n, dtype=np.bool_)
+    distance, at = np.empty(n), np.empty((n, 2))
+    parent, entry = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    done = np.empty(n, dtype=np.bool_)
+    for j in range(n):
+        distance[j], parent[j], entry[j], done[j] = np.inf, -1, -1, False
     distance[first], entry[first], at[first, 0], at[first, 1] = 0.0, rear_edge, start, d
     goal, front_edge, goal_distance = -1, -1, np.inf
     for _ in range(n):
@@ -348,7 +350,8 @@ def _trace_reachable(
     """
     n = triangles.shape[0]
     ring = np.empty((3 * n + 2, 2))
-    ring[0] = triangles[first, (entry[first] + 1) % 3]
+    corner = (entry[first] + 1) % 3
+    ring[0, 0], ring[0, 1] = triangles[first, corner, 0], triangles[first, corner, 1]
     size = 1
     stack = np.empty((3 * n, 2), dtype=np.int64)
     stack[0, 0], stack[0, 1] = first, 2
@@ -364,7 +367,8 @@ def _trace_reachable(
                 stack[depth, 0], stack[depth, 1] = j, turn
                 depth += 1
         else:
-            ring[size] = triangles[i, (edge + 1) % 3]
+            corner = (edge + 1) % 3
+            ring[size, 0], ring[size, 1] = triangles[i, corner, 0], triangles[i, corner, 1]
             size += 1
     furthest = 0
     for k in range(size):

@@ -67,7 +67,8 @@ def find_neighbours(
         lane_width: [m].
         neighbours: written, shape (3, 5).
     """
-    neighbours[:] = 0.0
+    for which in range(3):
+        neighbours[which, PRESENT] = 0.0
     for row in range(traffic.shape[0]):
         s, d, psi_road, _ = locate(line, traffic[row, X], traffic[row, Y])
         v = traffic[row, SPEED] * cos(traffic[row, HEADING] - psi_road)

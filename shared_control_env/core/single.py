@@ -22,7 +22,6 @@ from shared_control_env.core import (
     scene as scenes,
 )
 from shared_control_env.core.jit import jit
-from shared_control_env.core.records import Record
 
 
 @jit
@@ -31,8 +30,8 @@ def sense(
     state: np.ndarray,
     traffic: np.ndarray,
     line: np.ndarray,
-    parameters: Record,
-    scene: Record,
+    parameters: np.ndarray,
+    scene: np.ndarray,
     corners: np.ndarray,
 ) -> int:
     """:func:`scene.perceive`, then :func:`scene.holes_in_region`; returns the number of holes."""
@@ -41,96 +40,96 @@ def sense(
 
 
 @jit
-def search(triangles: np.ndarray, parameters: Record, scene: Record) -> None:
+def search(triangles: np.ndarray, parameters: np.ndarray, scene: np.ndarray) -> None:
     """:func:`safe_area.search_triangles` of a scene's driving region."""
     s, p = scene[()], parameters[()]
     safe_area.search_triangles(triangles, s.region[0], s.region[1], s.z[1], p.vehicle.width, s.area)
 
 
 @jit
-def clear_memory(memory: Record) -> None:
+def clear_memory(memory: np.ndarray) -> None:
     """:func:`closed_loop.clear_memory`."""
     closed_loop.clear_memory(memory[()])
 
 
 @jit
-def clear_signals(signals: Record) -> None:
+def clear_signals(signals: np.ndarray) -> None:
     """:func:`closed_loop.clear_signals`."""
     closed_loop.clear_signals(signals[()])
 
 
 @jit
-def clear_automation(memory: Record) -> None:
+def clear_automation(memory: np.ndarray) -> None:
     """:func:`closed_loop.clear_automation`."""
     closed_loop.clear_automation(memory[()])
 
 
 @jit
-def automate(scene: Record, parameters: Record, memory: Record, work: Record) -> tuple[int, int, float]:
+def automate(scene: np.ndarray, parameters: np.ndarray, memory: np.ndarray, work: np.ndarray) -> tuple[int, int, float]:
     """:func:`closed_loop.automate`."""
     return closed_loop.automate(scene[()], parameters[()], memory[()], work[()])
 
 
 @jit
 def solve_automation(
-    U: np.ndarray, scene: Record, parameters: Record, iterations: int, work: Record
+    U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, iterations: int, work: np.ndarray
 ) -> tuple[int, int, float, float]:
     """:func:`automation_mpc.solve`."""
     return automation_mpc.solve(U, scene[()], parameters[()], iterations, work[()])
 
 
 @jit
-def automation_cost(U: np.ndarray, scene: Record, parameters: Record, work: Record) -> float:
+def automation_cost(U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, work: np.ndarray) -> float:
     """:func:`automation_mpc.cost`."""
     return automation_mpc.cost(U, scene[()], parameters[()], work[()])
 
 
 @jit
 def monitor(
-    scene: Record,
+    scene: np.ndarray,
     traffic: np.ndarray,
     line: np.ndarray,
     faults: np.ndarray,
-    parameters: Record,
-    signals: Record,
+    parameters: np.ndarray,
+    signals: np.ndarray,
 ) -> None:
     """:func:`closed_loop.monitor`."""
     closed_loop.monitor(scene[()], traffic, line, faults, parameters[()], signals[()])
 
 
 @jit
-def fuzzy_authority(signals: Record, parameters: Record) -> float:
+def fuzzy_authority(signals: np.ndarray, parameters: np.ndarray) -> float:
     """alpha_a = FIS(r_x, r_y) of a monitored step (Eq. 9)."""
     s = signals[()]
     return fuzzy.authority(s.r_x, s.r_y, parameters[()].authority.operators)
 
 
 @jit
-def blend(u_h_des: np.ndarray, alpha_a: float, parameters: Record, memory: Record, signals: Record) -> None:
+def blend(u_h_des: np.ndarray, alpha_a: float, parameters: np.ndarray, memory: np.ndarray, signals: np.ndarray) -> None:
     """:func:`closed_loop.blend`."""
     closed_loop.blend(u_h_des, alpha_a, parameters[()], memory[()], signals[()])
 
 
 @jit
-def drive(state: np.ndarray, a: float, delta: float, dt: float, parameters: Record, work: Record) -> None:
+def drive(state: np.ndarray, a: float, delta: float, dt: float, parameters: np.ndarray, work: np.ndarray) -> None:
     """:func:`dynamics.plant_step`."""
     dynamics.plant_step(state, a, delta, dt, parameters[()].vehicle, work)
 
 
 @jit
-def observe(scene: Record, memory: Record, line: np.ndarray, parameters: Record, out: np.ndarray) -> None:
+def observe(scene: np.ndarray, memory: np.ndarray, line: np.ndarray, parameters: np.ndarray, out: np.ndarray) -> None:
     """:func:`observation.observe`."""
     observation.observe(scene[()], memory[()], line, parameters[()], out)
 
 
 @jit
-def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: int, info_record: Record) -> None:
+def note_signals(scene: np.ndarray, signals: np.ndarray, faults: np.ndarray, failures: int, info_record: np.ndarray) -> None:
     """:func:`info.note_signals`."""
     info.note_signals(scene[()], signals[()], faults, failures, info_record[()])
 
 
 @jit
-def note_start(scene: Record, parameters: Record, memory: Record, info_record: Record) -> None:
+def note_start(scene: np.ndarray, parameters: np.ndarray, memory: np.ndarray, info_record: np.ndarray) -> None:
     """:func:`info.note_outcome` of a reset, with zero reward terms."""
     s = scene[()]
     on_road = closed_loop.is_on_road(s, parameters[()])
@@ -142,12 +141,12 @@ def conclude(
     previous_s: float,
     last_a: float,
     crashed: bool,
-    scene: Record,
-    signals: Record,
-    parameters: Record,
-    memory: Record,
+    scene: np.ndarray,
+    signals: np.ndarray,
+    parameters: np.ndarray,
+    memory: np.ndarray,
     terms: np.ndarray,
-    info_record: Record,
+    info_record: np.ndarray,
 ) -> tuple[float, bool]:
     """:func:`closed_loop.conclude`."""
     return closed_loop.conclude(
@@ -157,10 +156,10 @@ def conclude(
 
 @jit
 def build_program(
-    scene: Record,
+    scene: np.ndarray,
     u_last: np.ndarray,
-    parameters: Record,
-    work: Record,
+    parameters: np.ndarray,
+    work: np.ndarray,
     P: np.ndarray,
     q: np.ndarray,
     A: np.ndarray,

@@ -48,6 +48,9 @@ KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 FEWEST_PER_THREAD = 64
 """Environments under which another thread costs more than it saves."""
 
+SHARES_PER_THREAD = 4
+"""Shares of the environments for every thread: one that falls behind leaves some of its own to the others."""
+
 
 class Actions(NamedTuple):
     """Both slots of every environment's action; zeros for a bound one.
@@ -133,8 +136,10 @@ class SharedControlVectorEnv(VectorEnv):
         wanted = threads or os.cpu_count() or 1
         self.threads = max(1, min(wanted, num_envs // FEWEST_PER_THREAD)) if threads is None else min(wanted, num_envs)
         self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
-        self._works = np.zeros(self.threads, WORKSPACE)
-        self._programs = np.zeros(self.threads, PROGRAM) if driver else None
+        shares = max(self.threads, min(SHARES_PER_THREAD * self.threads, num_envs // FEWEST_PER_THREAD))
+        self._edges = np.linspace(0, num_envs, shares + 1 if self._pool else 2).astype(int).tolist()
+        self._works = np.zeros(len(self._edges) - 1, WORKSPACE)
+        self._programs = np.zeros(len(self._edges) - 1, PROGRAM) if driver else None
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
         self._seeds: tuple[int | None, ...] = (None,) * num_envs
@@ -318,10 +323,10 @@ class SharedControlVectorEnv(VectorEnv):
         rewards = np.zeros((steps, self.num_envs))
         ends = np.zeros((steps, self.num_envs), dtype=bool)
 
-        def work(begin: int, end: int, thread: int) -> None:
+        def work(share: int) -> None:
             kernel.advance(
-                begin,
-                end,
+                self._edges[share],
+                self._edges[share + 1],
                 steps,
                 active,
                 resets,
@@ -334,15 +339,13 @@ class SharedControlVectorEnv(VectorEnv):
                 ends,
                 self._works,
                 self._programs,
-                thread,
+                share,
             )
 
         if self._pool is None:
-            work(0, self.num_envs, 0)
+            work(0)
         else:
-            edges = np.linspace(0, self.num_envs, self.threads + 1).astype(int).tolist()
-            for future in [self._pool.submit(work, edges[i], edges[i + 1], i) for i in range(self.threads)]:
-                future.result()
+            list(self._pool.map(work, range(len(self._edges) - 1)))  # the list raises what a share raised
         return Rollout(rewards, ends)
 
     def _outputs(self) -> Outputs:

@@ -78,7 +78,7 @@ def decide(
     setup: Setup,
     work: Record,
     programs: np.ndarray | None,
-    thread: int,
+    share: int,
     report: Record,
 ) -> float:
     """Bring both slots of the action together: the driver's command in ``work.command``, and alpha_a, returned.
@@ -88,8 +88,8 @@ def decide(
         commands: driver's commands over their limits, (N, 2); not read where the driver is bound.
         alphas: authorities, (N, 1); not read where the limiter is bound.
         batch, setup, work: see their types.
-        programs: records of :data:`records.PROGRAM`, one a thread; None leaves the driver's solver uncompiled.
-        thread: which of them is ours.
+        programs: records of :data:`records.PROGRAM`, one a share; None leaves the driver's solver uncompiled.
+        share: which of them is ours.
         report: record of :data:`records.SOLVER`, written.
     """
     p, scene, memory = batch.parameters[i], batch.scenes[i], batch.memories[i]
@@ -97,7 +97,7 @@ def decide(
         work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * p.limits.a_max
         work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * p.limits.delta_max
     else:
-        drive_by_program(scene, p, memory, work, programs[thread], report)
+        drive_by_program(scene, p, memory, work, programs[share], report)
         report.failures = memory.driver_failures
     if setup.limiter:
         return fuzzy.authority(batch.signals[i].r_x, batch.signals[i].r_y, p.authority.operators)
@@ -129,11 +129,11 @@ def apply(
     out: Outputs,
     work: Record,
     programs: np.ndarray | None,
-    thread: int,
+    share: int,
 ) -> None:
     """First half of a decision of environment i: both slots, the loop's commands, the vehicles' motion."""
     scene, signals, memory = batch.scenes[i], batch.signals[i], batch.memories[i]
-    alpha_a = decide(i, commands, alphas, batch, setup, work, programs, thread, out.solver[i])
+    alpha_a = decide(i, commands, alphas, batch, setup, work, programs, share, out.solver[i])
     closed_loop.blend(work.command, alpha_a, batch.parameters[i], memory, signals)
     note_signals(scene, signals, setup.faults, batch.automations[i].failures, out.infos[i])
     simulate(i, batch, setup, work)
@@ -180,7 +180,7 @@ def advance_one(
     out: Outputs,
     work: Record,
     programs: np.ndarray | None,
-    thread: int,
+    share: int,
 ) -> None:
     """Step environment i, or begin its next episode; the order is that of :class:`SharedControlEnv`."""
     scene, signals, memory, p = batch.scenes[i], batch.signals[i], batch.memories[i], batch.parameters[i]
@@ -189,7 +189,7 @@ def advance_one(
         restore(i, batch, setup, out)
         scene.k = -1
     else:
-        apply(i, commands, alphas, batch, setup, out, work, programs, thread)
+        apply(i, commands, alphas, batch, setup, out, work, programs, share)
     perceive_and_plan(i, scene.k + 1, batch, setup, work)
     if resetting:
         note_start(i, batch, setup, out, work)
@@ -226,7 +226,7 @@ def advance(
     ends: np.ndarray,
     works: np.ndarray,
     programs: np.ndarray | None,
-    thread: int,
+    share: int,
 ) -> None:
     """Advance the environments from begin to end, each by some steps in a row, resetting as the autoreset mode says.
 
@@ -241,11 +241,11 @@ def advance(
         out: of the last step.
         rewards: of every step, written, (steps, N).
         ends: whether an episode ended at each step, written, (steps, N).
-        works: records of :data:`records.WORKSPACE`, one a thread.
-        programs: records of :data:`records.PROGRAM`, one a thread, where the driver is bound; else None.
-        thread: which of them is ours.
+        works: records of :data:`records.WORKSPACE`, one a share.
+        programs: records of :data:`records.PROGRAM`, one a share, where the driver is bound; else None.
+        share: which of them is ours.
     """
-    work = works[thread]
+    work = works[share]
     for i in range(begin, end):
         if not active[i]:
             continue
@@ -253,7 +253,7 @@ def advance(
         resetting = resets[i] or (setup.autoreset == NEXT_STEP and batch.ended[i])
         same_step = terminated = truncated = False
         while k < steps:
-            advance_one(i, resetting, commands, alphas, batch, setup, out, work, programs, thread)
+            advance_one(i, resetting, commands, alphas, batch, setup, out, work, programs, share)
             if same_step:
                 out.rewards[i], out.terminations[i], out.truncations[i] = rewards[k, i], terminated, truncated
             else:

@@ -1,4 +1,4 @@
-"""Arrays of many environments, and the scratch of one thread."""
+"""Arrays of many environments, and the scratch of one share of them."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ WORKSPACE = np.dtype(
     ],
     align=True,
 )
-"""Scratch of one thread."""
+"""Scratch of one share of the environments."""
 
 PROGRAM = np.dtype(
     [
@@ -127,4 +127,4 @@ PROGRAM = np.dtype(
     ],
     align=True,
 )
-"""The driver's quadratic program and its solver's scratch, of one thread."""
+"""The driver's quadratic program and its solver's scratch, of one share of the environments."""

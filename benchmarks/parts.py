@@ -38,7 +38,7 @@ def _automation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndar
 def _perception(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         scene = batch.scenes[i]
-        scenes.perceive(scene.k, batch.states[i], batch.traffic[i], setup.line, batch.parameters[i], scene)
+        scenes.perceive(scene.k, batch.states[i], batch.traffic[i], batch.lines[i], batch.parameters[i], scene)
 
 
 @njit
@@ -59,7 +59,7 @@ def _triangulation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.n
 @njit
 def _risk(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
-        assessment.assess(batch.scenes[i], batch.traffic[i], setup.line, batch.parameters[i], batch.signals[i])
+        assessment.assess(batch.scenes[i], batch.traffic[i], batch.lines[i], batch.parameters[i], batch.signals[i])
 
 
 @njit
@@ -81,7 +81,7 @@ def _dynamics(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarra
 def _observation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     out = np.empty(25, dtype=np.float32)
     for i in range(batch.scenes.shape[0]):
-        observation.observe(batch.scenes[i], batch.memories[i], setup.line, batch.parameters[i], out)
+        observation.observe(batch.scenes[i], batch.memories[i], batch.lines[i], batch.parameters[i], out)
 
 
 @njit

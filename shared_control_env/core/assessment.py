@@ -85,4 +85,6 @@ def assess(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, 
     predict_neighbours(scene, traffic, line, p.task.tau_p, predicted)
     s, d = signals.prediction_road[0], signals.prediction_road[1]
     signals.r_y = lateral_risk(scene.area, s, d, p.lateral)
-    signals.r_x = longitudinal_risk(s, signals.prediction[3], predicted, p.vehicle.length, p.longitudinal)
+    signals.r_x = longitudinal_risk(
+        s, signals.prediction[3], predicted, p.vehicle.length, scene.changing, p.longitudinal
+    )

@@ -11,7 +11,7 @@ import numpy as np
 from shared_control_env.core import automation_mpc
 from shared_control_env.core.assessment import assess
 from shared_control_env.core.authority import apply_law
-from shared_control_env.core.degradation import degrade
+from shared_control_env.core.degradation import degrade, misperceive
 from shared_control_env.core.driver_lag import advance_lag
 from shared_control_env.core.info import note_outcome
 from shared_control_env.core.jit import jit, jit_inlined
@@ -41,6 +41,7 @@ def clear_signals(signals: Record) -> None:
         signals.u_h_des,
         signals.u_h_act,
         signals.u,
+        signals.misperception,
         signals.prediction_road,
     ):
         vector[0], vector[1] = 0.0, 0.0
@@ -63,6 +64,42 @@ def clear_automation(memory: Record) -> None:
     clear_sequence(memory.U)
     memory.u_a_des[0], memory.u_a_des[1] = 0.0, 0.0
     memory.failures = 0
+
+
+@jit_inlined
+def clear_faults(memories: np.ndarray) -> None:
+    """State of degradations that have not acted; what else they keep is written before it is read."""
+    for i in range(memories.shape[0]):
+        memories[i].acting = False
+
+
+@jit
+def misjudge(scene: Record, faults: np.ndarray, p: Parameters, signals: Record) -> tuple[float, float]:
+    """Make the scene what the automation takes it for; :func:`judge_rightly` puts it right again.
+
+    Missing the vehicle that precedes, it drives at its own target speed.
+
+    Args:
+        scene: record of :data:`records.SCENE`, changed.
+        faults: records of :class:`DegradationParameters`, shape (n,).
+        p: parameters.
+        signals: record of :data:`records.SIGNALS`; ``misperception`` is written.
+
+    Returns:
+        The true lateral position [m] and target speed [m/s].
+    """
+    y, v_target = scene.z[1], scene.v_target
+    misperceive(scene.t, faults, signals.misperception)
+    scene.z[1] += signals.misperception[0]
+    if signals.misperception[1] > 0.0:
+        scene.v_target = p.task.target_speed
+    return y, v_target
+
+
+@jit
+def judge_rightly(scene: Record, y: float, v_target: float) -> None:
+    """Undo :func:`misjudge`: for the monitor and for the driver the scene is what it is."""
+    scene.z[1], scene.v_target = y, v_target
 
 
 @jit_inlined
@@ -97,6 +134,7 @@ def monitor(
     traffic: np.ndarray,
     line: np.ndarray,
     faults: np.ndarray,
+    fault_memories: np.ndarray,
     p: Parameters,
     signals: Record,
 ) -> None:
@@ -106,22 +144,24 @@ def monitor(
         scene: record of :data:`records.SCENE`, its safe area found.
         traffic: other vehicles, shape (n, 8).
         line: reference line.
-        faults: rows of :func:`degradation.bias`, shape (m, 4).
+        faults: records of :class:`DegradationParameters`, shape (m,).
+        fault_memories: records of :data:`records.FAULT_MEMORY`, shape (m,).
         p: parameters.
         signals: record of :data:`records.SIGNALS` that holds ``u_a_des``, written.
     """
-    degrade(signals.u_a_des, scene.t, faults, p.limits, signals.u_a_f)
+    degrade(signals.u_a_des, scene.k, p.task.dt, faults, fault_memories, p.limits, signals.u_a_f)
     assess(scene, traffic, line, p, signals)
 
 
 @jit_inlined
-def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, memory: Record, signals: Record) -> None:
+def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, scene: Record, memory: Record, signals: Record) -> None:
     """Second half of a step: u_a,act (Eq. 10), u_h,act (Eq. 16) and ``u = clip(u_a,act + u_h,act)``.
 
     Args:
         u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
         alpha_a: authority in [0, 1].
         p: parameters.
+        scene: record of :data:`records.SCENE`; the driver will have felt u_a,act.
         memory: record of :data:`records.MEMORY`; the driver's lag advances.
         signals: record of :data:`records.SIGNALS`, completed.
     """
@@ -132,7 +172,7 @@ def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, memory: Record, si
         signals.u_h_des[i] = u_h_des[i]
         signals.u_h_act[i] = memory.u_h_act[i]
         signals.u[i] = min(max(signals.u_a_act[i] + signals.u_h_act[i], -bound), bound)
-        memory.u_h_des[i], memory.u[i] = u_h_des[i], signals.u[i]
+        memory.u_h_des[i], memory.u[i], scene.felt[i] = u_h_des[i], signals.u[i], signals.u_a_act[i]
     advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
     memory.alpha_a = alpha_a
 

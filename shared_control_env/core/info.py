@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from shared_control_env.core.degradation import ONSET
+from shared_control_env.core.degradation import has_set_in
 from shared_control_env.core.jit import jit
 from shared_control_env.core.records import MAX_CHAIN, Record
 from shared_control_env.core.reward import TERMS
@@ -19,6 +19,7 @@ INFO = np.dtype(
         ("z", np.float64, (6,)),  # ego [s, y, psi, v_x, v_y, r], road frame
         ("y_target", np.float64),  # lateral position to track [m]
         ("v_target", np.float64),  # speed to track [m/s]
+        ("neighbours", np.float64, (3, 5)),  # follower, leader, preceding: present, s [m], d [m], speed, traffic row
         ("u_a_des", np.float64, (2,)),  # automation's desired command [m/s^2, rad]
         ("u_a_f", np.float64, (2,)),  # degraded
         ("u_a_act", np.float64, (2,)),  # limited
@@ -34,6 +35,7 @@ INFO = np.dtype(
         ("safe_area_upper", np.float64, (MAX_CHAIN, 2)),
         ("safe_area_outcome", np.int64),  # safe_area.REACHED or BLOCKED
         ("fault", np.float64, (2,)),  # u_a,f - u_a,des: ground truth
+        ("misperception", np.float64, (2,)),  # automation's lane offset [m], 1 where it misses its lead: ground truth
         ("fault_active", np.bool_),  # whether any degradation has set in: ground truth
         (
             "automation",
@@ -63,7 +65,7 @@ def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: i
     Args:
         scene: record of :data:`records.SCENE`.
         signals: record of :data:`records.SIGNALS`.
-        faults: rows of :func:`degradation.bias`, shape (n, 4).
+        faults: records of :class:`DegradationParameters`, shape (n,).
         failures: of the automation's solver so far.
         info: record of :data:`INFO`, written up to ``automation``.
     """
@@ -75,7 +77,10 @@ def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: i
         info.u_a_des[i], info.u_a_f[i], info.u_a_act[i] = signals.u_a_des[i], signals.u_a_f[i], signals.u_a_act[i]
         info.u_h_des[i], info.u_h_act[i], info.u[i] = signals.u_h_des[i], signals.u_h_act[i], signals.u[i]
         info.fault[i] = signals.u_a_f[i] - signals.u_a_des[i]
-        info.prediction_road[i] = signals.prediction_road[i]
+        info.prediction_road[i], info.misperception[i] = signals.prediction_road[i], signals.misperception[i]
+    for i in range(3):
+        for j in range(5):
+            info.neighbours[i, j] = scene.neighbours[i, j]
     info.r_x, info.r_y, info.alpha_a = signals.r_x, signals.r_y, signals.alpha_a
     for k in range(MAX_CHAIN):
         for i in range(2):
@@ -84,7 +89,7 @@ def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: i
     info.safe_area_outcome = scene.area.outcome
     info.fault_active = False
     for i in range(faults.shape[0]):
-        if faults[i, ONSET] <= scene.t:
+        if has_set_in(faults[i], scene.t):
             info.fault_active = True
     info.automation.status, info.automation.iterations = signals.status, signals.iterations
     info.automation.residual, info.automation.failures = signals.residual, failures

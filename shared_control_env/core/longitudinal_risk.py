@@ -128,6 +128,7 @@ def longitudinal_risk(
     v_e: float,
     neighbours: np.ndarray,
     length: float,
+    changing: bool,
     parameters: LongitudinalRiskParameters,
 ) -> float:
     """Longitudinal risk r_x (Eq. 7): the weighted ratios of follower, leader and preceding vehicle.
@@ -138,6 +139,7 @@ def longitudinal_risk(
         s_e, v_e: predicted position along the road [m] and speed [m/s] of the ego.
         neighbours: rows ``[present, s, v]`` predicted, in the order of :data:`FOLLOWER`..., shape (3, 3).
         length: vehicle length [m], subtracted where distances are bumper to bumper.
+        changing: whether the weights are those of a lane change.
         parameters: of the field.
 
     Returns:
@@ -145,6 +147,8 @@ def longitudinal_risk(
     """
     risk = 0.0
     weights = (parameters.w_f, parameters.w_l, parameters.w_p)
+    if changing:
+        weights = (parameters.w_f_change, parameters.w_l_change, parameters.w_p_change)
     for i in range(3):
         if neighbours[i, 0] > 0.0:
             dx = neighbours[i, 1] - s_e

@@ -129,6 +129,9 @@ class LongitudinalRiskParameters(NamedTuple):
         w_f: weight of the follower [-]; paper, Table V (lane keeping).
         w_l: weight of the leader [-]; paper, Table V (lane keeping).
         w_p: weight of the preceding vehicle [-]; paper, Table V (lane keeping).
+        w_f_change: weight of the follower during a lane change [-]; paper, Table V.
+        w_l_change: weight of the leader during a lane change [-]; paper, Table V.
+        w_p_change: weight of the preceding vehicle during a lane change [-]; paper, Table V.
         bumper_to_bumper: subtract one vehicle length from the distance of the centres; ours.
     """
 
@@ -144,6 +147,9 @@ class LongitudinalRiskParameters(NamedTuple):
     w_f: Fraction = 0.1
     w_l: Fraction = 0.2
     w_p: Fraction = 0.7
+    w_f_change: Fraction = 0.8
+    w_l_change: Fraction = 0.1
+    w_p_change: Fraction = 0.1
     bumper_to_bumper: bool = False
 
 
@@ -228,6 +234,9 @@ class TaskParameters(NamedTuple):
         road_high: left edge of the road in the road frame [m].
         y_target: lateral position of the lane to keep [m].
         target_speed: speed to drive where no slower vehicle precedes [m/s]; Case 1 (15 m/s).
+        y_goal: lateral position of the lane to change to [m].
+        change_onset: when the lane change begins [s]; infinite for none.
+        change_duration: of the lane change [s]; ours.
     """
 
     dt: Positive = 0.05
@@ -237,6 +246,63 @@ class TaskParameters(NamedTuple):
     road_high: float = 6.0
     y_target: float = 0.0
     target_speed: Positive = 15.0
+    y_goal: float = 0.0
+    change_onset: NonNegative = math.inf
+    change_duration: Positive = 4.0
+
+
+class DegradationParameters(NamedTuple):
+    """One degradation of the automation (:mod:`core.degradation`); all ours but the paper's two biases.
+
+    Attributes:
+        kind: index in :data:`core.degradation.KINDS`.
+        acceleration: whether it acts on the acceleration command.
+        steering: whether it acts on the steering command.
+        onset: when it sets in [s]; paper, Eq. 17, 18.
+        ramp: time over which it grows to its full size [s]; paper, Eq. 17, 18.
+        duration: from the onset until it is gone again [s]; infinite for a permanent one.
+        period: of an intermittent one [s]; 0 for one that does not come and go.
+        duty: share of the period in which an intermittent one is there [-].
+        size: what the kind says, in its unit; paper, Eq. 17, 18.
+        time_constant: correlation time of coloured noise [s].
+        frequency: of an oscillation [Hz].
+        seed: of noise.
+    """
+
+    kind: int = 0
+    acceleration: bool = False
+    steering: bool = False
+    onset: NonNegative = 0.0
+    ramp: NonNegative = 0.0
+    duration: Positive = math.inf
+    period: NonNegative = 0.0
+    duty: Fraction = 0.5
+    size: float = 0.0
+    time_constant: Positive = 0.5
+    frequency: Positive = 0.5
+    seed: int = 0
+
+
+class TrafficParameters(NamedTuple):
+    """What another vehicle is going to do (:mod:`core.traffic`); all ours.
+
+    Attributes:
+        follows: whether it keeps its distance by the Intelligent Driver Model; else it holds its speed.
+        desired_speed: v_0 of that model [m/s].
+        brake_onset: when it begins to brake [s]; infinite for never.
+        deceleration: with which it then brakes to a stop [m/s^2].
+        change_onset: when it begins to move over to another lane [s]; infinite for never.
+        change_duration: how long that takes [s].
+        shift: how far it moves over, positive to the left [m].
+    """
+
+    follows: bool = False
+    desired_speed: Positive = 15.0
+    brake_onset: NonNegative = math.inf
+    deceleration: NonNegative = 0.0
+    change_onset: NonNegative = math.inf
+    change_duration: Positive = 3.0
+    shift: float = 0.0
 
 
 class AuthorityParameters(NamedTuple):

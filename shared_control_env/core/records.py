@@ -20,6 +20,9 @@ MAX_HORIZON = 30
 MAX_CONTROL = 10
 """Longest control horizon H_c [steps]."""
 
+MAX_DELAY = 21
+"""Time steps of the command that a delay can reach back to, the present one included."""
+
 MAX_CHAIN = 20
 """Vertices kept of a boundary of the safe area; shorter ones repeat their last vertex."""
 
@@ -69,6 +72,8 @@ SCENE = np.dtype(
         ("kappa", np.float64, (MAX_HORIZON,)),  # curvature at the stages of the horizon [1/m]
         ("y_target", np.float64),  # lateral position to track [m]
         ("v_target", np.float64),  # speed to track [m/s]
+        ("changing", np.bool_),  # whether a lane change is under way
+        ("felt", np.float64, (2,)),  # automation's actual command of the step before, felt at wheel and pedal
         ("neighbours", np.float64, (3, 5)),  # follower, leader, preceding
         ("region", np.float64, (4,)),  # driving region: start, end, low, high [m]
         ("area", SAFE_AREA),
@@ -81,6 +86,7 @@ SIGNALS = np.dtype(
     [
         ("u_a_des", np.float64, (2,)),  # automation's desired command [m/s^2, rad]
         ("u_a_f", np.float64, (2,)),  # the same, degraded
+        ("misperception", np.float64, (2,)),  # of the automation: lane offset [m], 1 where it misses its lead
         ("prediction", np.float64, (6,)),  # xi = [x, y, psi, v, a, r] after tau_p, Cartesian frame
         ("prediction_road", np.float64, (2,)),  # its (s, d) [m]
         ("r_x", np.float64),  # longitudinal risk
@@ -97,6 +103,18 @@ SIGNALS = np.dtype(
     align=True,
 )
 """Every signal of one time step."""
+
+FAULT_MEMORY = np.dtype(
+    [
+        ("acting", np.bool_),  # whether it acted in the step before
+        ("held", np.float64, (2,)),  # command at the moment it set in
+        ("last", np.float64, (2,)),  # its last output
+        ("noise", np.float64, (2,)),  # state of coloured noise
+        ("past", np.float64, (MAX_DELAY, 2)),  # commands of the last steps, step k in row k % MAX_DELAY
+    ],
+    align=True,
+)
+"""What a degradation carries from one time step to the next."""
 
 AUTOMATION_MEMORY = np.dtype(
     [

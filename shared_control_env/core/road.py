@@ -1,8 +1,9 @@
 """The road's reference line: straights and arcs, and the road frame ``(s, d)`` along it.
 
 A line is an array of segments, one row ``[s0, x0, y0, psi0, kappa, length]`` each: where it begins,
-as path length and pose, its curvature (positive to the left) and its length. ``d`` is the offset to
-the left of the line. Lanes are the line shifted by their ``d``.
+as path length and pose, its curvature (positive to the left) and its length. Rows that begin at infinity
+fill an array up and are no segments. ``d`` is the offset to the left of the line. Lanes are the line shifted
+by their ``d``.
 """
 
 from __future__ import annotations
@@ -111,6 +112,8 @@ def locate(line: np.ndarray, x: float, y: float) -> tuple[float, float, float, f
     s = d = 0.0
     nearest = 0
     for i in range(n):
+        if line[i, S0] == np.inf:
+            break
         along, across = _project(line[i], x, y)
         distance = abs(across) + max(0.0, -along, along - line[i, LENGTH])
         if distance < best:

@@ -7,6 +7,7 @@ from math import cos, sin
 import numpy as np
 
 from shared_control_env.core.jit import jit, jit_inlined
+from shared_control_env.core.lane_change import change_progress
 from shared_control_env.core.longitudinal_risk import FOLLOWER, LEADER, PRECEDING
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import (
@@ -86,7 +87,8 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
 
     The target speed is the preceding vehicle's where that is slower (Section VI: "follow the
     preceding"). The driving region is the lane to keep, from the ego to d_o behind the preceding
-    vehicle's rear or to the look-ahead (Section III-B).
+    vehicle's rear or to the look-ahead (Section III-B). During a lane change it is both lanes, to the look-ahead,
+    with the vehicles as holes; the lane to keep is the old one for its first half and the new one from then on.
 
     Args:
         k: time step.
@@ -105,19 +107,25 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
     s_e = scene.z[0]
     for i in range(max(p.automation.H_p, p.driver.H_p)):
         scene.kappa[i] = curvature_at(line, s_e + i * task.dt * state[3], 0.0)
-    find_neighbours(line, traffic, s_e, task.y_target, task.lane_width, scene.neighbours)
+    progress = change_progress(scene.t, task.change_onset, task.change_duration)
+    scene.changing = 0.0 < progress < 1.0
+    scene.y_target = task.y_target + (task.y_goal - task.y_target) * progress
+    lane = task.y_target if progress < 0.5 else task.y_goal
+    find_neighbours(line, traffic, s_e, lane, task.lane_width, scene.neighbours)
     preceding = scene.neighbours[PRECEDING]
-    scene.y_target = task.y_target
     scene.v_target = task.target_speed
     end = s_e + p.safe_area.look_ahead
     if preceding[PRESENT] > 0.0:
         scene.v_target = min(task.target_speed, max(preceding[NEAR_SPEED], 0.0))
-        rear = preceding[NEAR_S] - 0.5 * traffic[int(preceding[NEAR_ROW]), BODY_LENGTH]
-        end = min(end, rear - p.safe_area.d_o)
+        if not scene.changing:
+            rear = preceding[NEAR_S] - 0.5 * traffic[int(preceding[NEAR_ROW]), BODY_LENGTH]
+            end = min(end, rear - p.safe_area.d_o)
+    rightmost = min(task.y_target, task.y_goal) if scene.changing else lane
+    leftmost = max(task.y_target, task.y_goal) if scene.changing else lane
     scene.region[0] = s_e
     scene.region[1] = max(end, s_e + _SHORTEST_REGION)
-    scene.region[2] = task.y_target - 0.5 * task.lane_width
-    scene.region[3] = task.y_target + 0.5 * task.lane_width
+    scene.region[2] = rightmost - 0.5 * task.lane_width
+    scene.region[3] = leftmost + 0.5 * task.lane_width
 
 
 @jit

@@ -21,7 +21,11 @@ from shared_control_env.core import (
 from shared_control_env.core import (
     scene as scenes,
 )
+from shared_control_env.core import (
+    traffic as vehicles,
+)
 from shared_control_env.core.jit import jit
+from shared_control_env.core.records import Record
 
 
 @jit
@@ -30,8 +34,8 @@ def sense(
     state: np.ndarray,
     traffic: np.ndarray,
     line: np.ndarray,
-    parameters: np.ndarray,
-    scene: np.ndarray,
+    parameters: Record,
+    scene: Record,
     corners: np.ndarray,
 ) -> int:
     """:func:`scene.perceive`, then :func:`scene.holes_in_region`; returns the number of holes."""
@@ -40,96 +44,136 @@ def sense(
 
 
 @jit
-def search(triangles: np.ndarray, parameters: np.ndarray, scene: np.ndarray) -> None:
+def search(triangles: np.ndarray, parameters: Record, scene: Record) -> None:
     """:func:`safe_area.search_triangles` of a scene's driving region."""
     s, p = scene[()], parameters[()]
     safe_area.search_triangles(triangles, s.region[0], s.region[1], s.z[1], p.vehicle.width, s.area)
 
 
 @jit
-def clear_memory(memory: np.ndarray) -> None:
+def decide_acceleration(
+    row: np.ndarray,
+    plan: Record,
+    t: float,
+    ego: np.ndarray,
+    traffic: np.ndarray,
+    line: np.ndarray,
+    lane_width: float,
+) -> None:
+    """:func:`traffic.decide_acceleration`."""
+    vehicles.decide_acceleration(row, plan[()], t, ego, traffic, line, lane_width)
+
+
+@jit
+def move(row: np.ndarray, plan: Record, line: np.ndarray, t: float, dt: float) -> None:
+    """:func:`traffic.move`."""
+    vehicles.move(row, plan[()], line, t, dt)
+
+
+@jit
+def misjudge(scene: Record, faults: np.ndarray, parameters: Record, signals: Record) -> tuple[float, float]:
+    """:func:`closed_loop.misjudge`."""
+    return closed_loop.misjudge(scene[()], faults, parameters[()], signals[()])
+
+
+@jit
+def judge_rightly(scene: Record, y: float, v_target: float) -> None:
+    """:func:`closed_loop.judge_rightly`."""
+    closed_loop.judge_rightly(scene[()], y, v_target)
+
+
+@jit
+def clear_memory(memory: Record) -> None:
     """:func:`closed_loop.clear_memory`."""
     closed_loop.clear_memory(memory[()])
 
 
 @jit
-def clear_signals(signals: np.ndarray) -> None:
+def clear_signals(signals: Record) -> None:
     """:func:`closed_loop.clear_signals`."""
     closed_loop.clear_signals(signals[()])
 
 
 @jit
-def clear_automation(memory: np.ndarray) -> None:
+def clear_automation(memory: Record) -> None:
     """:func:`closed_loop.clear_automation`."""
     closed_loop.clear_automation(memory[()])
 
 
 @jit
-def automate(scene: np.ndarray, parameters: np.ndarray, memory: np.ndarray, work: np.ndarray) -> tuple[int, int, float]:
+def automate(scene: Record, parameters: Record, memory: Record, work: Record) -> tuple[int, int, float]:
     """:func:`closed_loop.automate`."""
     return closed_loop.automate(scene[()], parameters[()], memory[()], work[()])
 
 
 @jit
 def solve_automation(
-    U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, iterations: int, work: np.ndarray
+    U: np.ndarray, scene: Record, parameters: Record, iterations: int, work: Record
 ) -> tuple[int, int, float, float]:
     """:func:`automation_mpc.solve`."""
     return automation_mpc.solve(U, scene[()], parameters[()], iterations, work[()])
 
 
 @jit
-def automation_cost(U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, work: np.ndarray) -> float:
+def automation_cost(U: np.ndarray, scene: Record, parameters: Record, work: Record) -> float:
     """:func:`automation_mpc.cost`."""
     return automation_mpc.cost(U, scene[()], parameters[()], work[()])
 
 
 @jit
 def monitor(
-    scene: np.ndarray,
+    scene: Record,
     traffic: np.ndarray,
     line: np.ndarray,
     faults: np.ndarray,
-    parameters: np.ndarray,
-    signals: np.ndarray,
+    fault_memories: np.ndarray,
+    parameters: Record,
+    signals: Record,
 ) -> None:
     """:func:`closed_loop.monitor`."""
-    closed_loop.monitor(scene[()], traffic, line, faults, parameters[()], signals[()])
+    closed_loop.monitor(scene[()], traffic, line, faults, fault_memories, parameters[()], signals[()])
 
 
 @jit
-def fuzzy_authority(signals: np.ndarray, parameters: np.ndarray) -> float:
+def fuzzy_authority(signals: Record, parameters: Record) -> float:
     """alpha_a = FIS(r_x, r_y) of a monitored step (Eq. 9)."""
     s = signals[()]
     return fuzzy.authority(s.r_x, s.r_y, parameters[()].authority.operators)
 
 
 @jit
-def blend(u_h_des: np.ndarray, alpha_a: float, parameters: np.ndarray, memory: np.ndarray, signals: np.ndarray) -> None:
+def blend(
+    u_h_des: np.ndarray,
+    alpha_a: float,
+    parameters: Record,
+    scene: Record,
+    memory: Record,
+    signals: Record,
+) -> None:
     """:func:`closed_loop.blend`."""
-    closed_loop.blend(u_h_des, alpha_a, parameters[()], memory[()], signals[()])
+    closed_loop.blend(u_h_des, alpha_a, parameters[()], scene[()], memory[()], signals[()])
 
 
 @jit
-def drive(state: np.ndarray, a: float, delta: float, dt: float, parameters: np.ndarray, work: np.ndarray) -> None:
+def drive(state: np.ndarray, a: float, delta: float, dt: float, parameters: Record, work: Record) -> None:
     """:func:`dynamics.plant_step`."""
     dynamics.plant_step(state, a, delta, dt, parameters[()].vehicle, work)
 
 
 @jit
-def observe(scene: np.ndarray, memory: np.ndarray, line: np.ndarray, parameters: np.ndarray, out: np.ndarray) -> None:
+def observe(scene: Record, memory: Record, line: np.ndarray, parameters: Record, out: np.ndarray) -> None:
     """:func:`observation.observe`."""
     observation.observe(scene[()], memory[()], line, parameters[()], out)
 
 
 @jit
-def note_signals(scene: np.ndarray, signals: np.ndarray, faults: np.ndarray, failures: int, info_record: np.ndarray) -> None:
+def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: int, info_record: Record) -> None:
     """:func:`info.note_signals`."""
     info.note_signals(scene[()], signals[()], faults, failures, info_record[()])
 
 
 @jit
-def note_start(scene: np.ndarray, parameters: np.ndarray, memory: np.ndarray, info_record: np.ndarray) -> None:
+def note_start(scene: Record, parameters: Record, memory: Record, info_record: Record) -> None:
     """:func:`info.note_outcome` of a reset, with zero reward terms."""
     s = scene[()]
     on_road = closed_loop.is_on_road(s, parameters[()])
@@ -141,12 +185,12 @@ def conclude(
     previous_s: float,
     last_a: float,
     crashed: bool,
-    scene: np.ndarray,
-    signals: np.ndarray,
-    parameters: np.ndarray,
-    memory: np.ndarray,
+    scene: Record,
+    signals: Record,
+    parameters: Record,
+    memory: Record,
     terms: np.ndarray,
-    info_record: np.ndarray,
+    info_record: Record,
 ) -> tuple[float, bool]:
     """:func:`closed_loop.conclude`."""
     return closed_loop.conclude(
@@ -156,10 +200,10 @@ def conclude(
 
 @jit
 def build_program(
-    scene: np.ndarray,
+    scene: Record,
     u_last: np.ndarray,
-    parameters: np.ndarray,
-    work: np.ndarray,
+    parameters: Record,
+    work: Record,
     P: np.ndarray,
     q: np.ndarray,
     A: np.ndarray,

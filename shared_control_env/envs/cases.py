@@ -1,23 +1,43 @@
-"""The paper's two cases as settings."""
+"""The registered scenarios as settings: the paper's two cases, and eight that are drawn within ranges."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+
+from shared_control_env.envs.degradations import DEGRADATIONS
 
 
 class Case(NamedTuple):
     """A registered scenario.
 
     Attributes:
+        id: with Gymnasium.
+        description: in a line.
         settings: changes to the default settings.
-        environment: module and class of the single environment.
     """
 
+    id: str
+    description: str
     settings: dict[str, Any]
-    environment: str
 
+
+def _draw(setting: str, low: float, high: float) -> dict[str, Any]:
+    return {"setting": setting, "low": low, "high": high}
+
+
+def _choose(setting: str, *choices: float) -> dict[str, Any]:
+    return {"setting": setting, "choices": list(choices)}
+
+
+_FAULTS = [name for name, entry in DEGRADATIONS.items() if entry is not None]
+"""What the drawn scenarios draw their degradation from."""
+
+_CURVATURES = [sign / radius for radius in (60.0, 80.0, 120.0, 200.0) for sign in (1.0, -1.0)]
+"""Curves to the left and to the right [1/m]."""
 
 TWO_LANE = Case(
+    id="SharedControl/TwoLane-v0",
+    description="Case 1: straight, two lanes, following a slower vehicle at 12 m/s; steering drifts off by 0.3 rad",
     settings={
         "vehicles": [
             {"lane": 0, "position": 38.0, "speed": 12.0},  # preceding
@@ -27,11 +47,12 @@ TWO_LANE = Case(
         # delta_f = delta_des + 0.3 (k - 10) / 20 for 10 <= k <= 30, then + 0.3.
         "faults": [{"channel": "steering", "onset": 0.5, "ramp": 1.0, "size": 0.3}],
     },
-    environment="shared_control_env.envs.scenarios:TwoLaneEnv",
 )
 """Case 1 (Section VI-B, Table VI): lane keeping behind a slower vehicle on a straight road; the steering degrades."""
 
 CURVE = Case(
+    id="SharedControl/Curve-v0",
+    description="Case 2: curve of 60 m radius behind a vehicle at 12 m/s; acceleration drifts off by 3 m/s^2",
     settings={
         "road": {"segments": [{"length": 300.0, "curvature": 1.0 / 60.0}]},
         "ego": {"speed": 12.0},
@@ -40,6 +61,202 @@ CURVE = Case(
         "faults": [{"channel": "acceleration", "onset": 0.25, "ramp": 0.25, "size": 3.0}],
         "screen_height": 632,
     },
-    environment="shared_control_env.envs.scenarios:CurveEnv",
 )
 """Case 2 (Section VI-C): following a vehicle round a curve of 60 m radius; the acceleration degrades."""
+
+LANE_KEEPING = Case(
+    id="SharedControl/LaneKeeping-v0",
+    description="straight, two lanes: keep the lane behind a slower vehicle, with others beside",
+    settings={
+        "vehicles": [
+            {"lane": 0, "position": 45.0, "speed": 12.0},
+            {"lane": 1, "position": 30.0, "speed": 15.0},
+            {"lane": 1, "position": -15.0, "speed": 13.0},
+        ],
+        "degradations": _FAULTS,
+        "randomise": [
+            _draw("ego.speed", 12.0, 18.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 12.0, 18.0),
+            _draw("vehicles.0.position", 30.0, 60.0),
+            _draw("vehicles.0.speed", 9.0, 14.0),
+            _draw("vehicles.1.position", 15.0, 45.0),
+            _draw("vehicles.1.speed", 13.0, 18.0),
+            _draw("vehicles.2.position", -25.0, -10.0),
+            _draw("vehicles.2.speed", 11.0, 15.0),
+        ],
+    },
+)
+
+BEND = Case(
+    id="SharedControl/Bend-v0",
+    description="a curve of 60 to 200 m radius to either side, free road",
+    settings={
+        "road": {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0, "curvature": 1.0 / 60.0}]},
+        "ego": {"speed": 12.0},
+        "degradations": _FAULTS,
+        "screen_height": 632,
+        "randomise": [
+            _choose("road.segments.1.curvature", *_CURVATURES),
+            _draw("ego.speed", 9.0, 13.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 9.0, 13.0),
+        ],
+    },
+)
+
+S_CURVE = Case(
+    id="SharedControl/SCurve-v0",
+    description="an S-curve, two arcs of 60 to 200 m radius, free road",
+    settings={
+        "road": {
+            "segments": [
+                {"length": 25.0, "curvature": 0.0},
+                {"length": 50.0, "curvature": 1.0 / 60.0},
+                {"length": 50.0, "curvature": -1.0 / 60.0},
+                {"length": 400.0, "curvature": 0.0},
+            ]
+        },
+        "ego": {"speed": 12.0},
+        "degradations": _FAULTS,
+        "screen_height": 632,
+        "randomise": [
+            _draw("road.segments.1.curvature", 1.0 / 200.0, 1.0 / 60.0),
+            _draw("road.segments.2.curvature", -1.0 / 60.0, -1.0 / 200.0),
+            _draw("ego.speed", 9.0, 13.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 9.0, 13.0),
+        ],
+    },
+)
+
+LANE_CHANGE = Case(
+    id="SharedControl/LaneChange-v0",
+    description="change to the left lane past a slower vehicle; both lanes are the driving region",
+    settings={
+        "lane_change": {"onset": 1.5, "duration": 4.0, "lane": 1},
+        "vehicles": [
+            {"lane": 0, "position": 40.0, "speed": 10.0},
+            {"lane": 1, "position": 45.0, "speed": 15.0},
+            {"lane": 1, "position": -20.0, "speed": 13.0},
+        ],
+        "degradations": _FAULTS,
+        "randomise": [
+            _draw("lane_change.onset", 1.0, 2.0),
+            _draw("lane_change.duration", 3.5, 5.0),
+            _draw("ego.speed", 13.0, 16.0),
+            _draw("vehicles.0.position", 35.0, 50.0),
+            _draw("vehicles.0.speed", 9.0, 12.0),
+            _draw("vehicles.1.position", 35.0, 60.0),
+            _draw("vehicles.1.speed", 14.0, 17.0),
+            _draw("vehicles.2.position", -30.0, -15.0),
+            _draw("vehicles.2.speed", 11.0, 14.0),
+        ],
+    },
+)
+
+CUT_IN = Case(
+    id="SharedControl/CutIn-v0",
+    description="a vehicle from the left lane cuts in before the ego",
+    settings={
+        "vehicles": [
+            {
+                "lane": 1,
+                "position": 16.0,
+                "speed": 13.0,
+                "lane_change": {"onset": 2.0, "duration": 3.0, "lane": 0},
+            },
+            {"lane": 0, "position": 60.0, "speed": 13.0},
+        ],
+        "degradations": _FAULTS,
+        "randomise": [
+            _draw("ego.speed", 13.0, 15.0),
+            _draw("vehicles.0.position", 14.0, 20.0),
+            _draw("vehicles.0.speed", 12.0, 14.0),
+            _draw("vehicles.0.lane_change.onset", 1.0, 2.5),
+            _draw("vehicles.0.lane_change.duration", 2.0, 3.5),
+            _draw("vehicles.1.position", 50.0, 80.0),
+        ],
+    },
+)
+
+LEAD_BRAKING = Case(
+    id="SharedControl/LeadBraking-v0",
+    description="the vehicle ahead brakes hard, to a stop",
+    settings={
+        "ego": {"speed": 14.0},
+        "vehicles": [
+            {"lane": 0, "position": 30.0, "speed": 14.0, "brake": {"onset": 2.5, "deceleration": 4.5}},
+            {"lane": 1, "position": -15.0, "speed": 14.0},
+        ],
+        "degradations": _FAULTS,
+        "randomise": [
+            _draw("ego.speed", 13.0, 15.0),
+            _draw("vehicles.0.position", 25.0, 40.0),
+            _draw("vehicles.0.speed", 13.0, 15.0),
+            _draw("vehicles.0.brake.onset", 1.5, 3.5),
+            _draw("vehicles.0.brake.deceleration", 3.0, 6.0),
+            _draw("vehicles.1.position", -25.0, -10.0),
+        ],
+    },
+)
+
+_DENSE = [(0, 22.0), (0, 44.0), (0, 66.0), (0, -20.0), (1, 8.0), (1, 30.0), (1, 52.0), (1, -14.0)]
+"""Lane and position [m] of the vehicles of dense traffic, before 4 m to either side are drawn."""
+
+DENSE_TRAFFIC = Case(
+    id="SharedControl/DenseTraffic-v0",
+    description="eight vehicles that follow one another and the ego by the Intelligent Driver Model",
+    settings={
+        "ego": {"speed": 10.0},
+        "vehicles": [
+            {"lane": lane, "position": position, "speed": 10.0, "behaviour": "idm", "desired_speed": 13.0}
+            for lane, position in _DENSE
+        ],
+        "degradations": _FAULTS,
+        "randomise": [
+            _draw("ego.speed", 9.0, 11.0),
+            *(
+                entry
+                for i, (_, position) in enumerate(_DENSE)
+                for entry in (
+                    _draw(f"vehicles.{i}.position", position - 4.0, position + 4.0),
+                    _draw(f"vehicles.{i}.speed", 8.0, 12.0),
+                    _draw(f"vehicles.{i}.desired_speed", 9.0, 15.0),
+                )
+            ),
+        ],
+    },
+)
+
+CURVE_WITH_LEAD = Case(
+    id="SharedControl/CurveWithLead-v0",
+    description="a curve of 60 to 200 m radius to either side behind a vehicle that follows the road at 9 to 12 m/s",
+    settings={
+        "road": {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0, "curvature": 1.0 / 60.0}]},
+        "ego": {"speed": 12.0},
+        "vehicles": [{"lane": 0, "position": 20.0, "speed": 11.0}],
+        "degradations": _FAULTS,
+        "screen_height": 632,
+        "randomise": [
+            _choose("road.segments.1.curvature", *_CURVATURES),
+            _draw("ego.speed", 10.0, 13.0),
+            _draw("vehicles.0.position", 15.0, 25.0),
+            _draw("vehicles.0.speed", 9.0, 12.0),
+        ],
+    },
+)
+
+CASES: dict[str, Case] = {
+    "two_lane": TWO_LANE,
+    "curve": CURVE,
+    "lane_keeping": LANE_KEEPING,
+    "bend": BEND,
+    "s_curve": S_CURVE,
+    "lane_change": LANE_CHANGE,
+    "cut_in": CUT_IN,
+    "lead_braking": LEAD_BRAKING,
+    "dense_traffic": DENSE_TRAFFIC,
+    "curve_with_lead": CURVE_WITH_LEAD,
+}
+"""All scenarios by the name that the benchmark and the entry points know them by."""

@@ -20,8 +20,16 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 from shared_control_env.core import parameters as core
 from shared_control_env.core.authority import LAWS
-from shared_control_env.core.degradation import CHANNELS
+from shared_control_env.core.degradation import KINDS
 from shared_control_env.core.fuzzy import OPERATORS
+from shared_control_env.core.records import MAX_DELAY, pack, record_dtype
+from shared_control_env.envs.degradations import DEGRADATIONS
+
+SHARES, TIMES, NOISES = ("loss_of_effectiveness", "saturation"), ("delay",), ("white_noise", "coloured_noise")
+"""Kinds of degradation whose size is a share in [0, 1], a time, and a standard deviation."""
+
+WITHOUT_SIZE = ("stuck", "drop_out", "sign_error", "missed_lead")
+"""Kinds of degradation that have no size."""
 
 LEAD_IN = 50.0
 """Straight road behind the ego's start [m]."""
@@ -65,21 +73,56 @@ class EgoSettings(_Section):
     lateral_offset: float = 0.0  # from the lane's centre, positive to the left [m]
 
 
+class BrakeSettings(_Section):
+    """Braking to a stop."""
+
+    onset: core.NonNegative  # [s]
+    deceleration: core.Positive  # [m/s^2]
+
+
+class LaneChangeSettings(_Section):
+    """A move over to another lane (core.lane_change)."""
+
+    onset: core.NonNegative  # [s]
+    duration: core.Positive = 4.0  # [s]
+    lane: Annotated[int, Ge(0)]
+
+
 class VehicleSettings(_Section):
-    """Another vehicle at its start; positions are those of the centres, relative to the ego's."""
+    """Another vehicle at its start; positions are those of the centres, relative to the ego's (core.traffic)."""
 
     lane: Annotated[int, Ge(0)]
     position: float  # along the road [m]
     speed: core.NonNegative  # [m/s]
+    behaviour: Literal["constant", "idm"] = "constant"
+    desired_speed: core.Positive | None = None  # of idm [m/s]; None for its first speed
+    brake: BrakeSettings | None = None
+    lane_change: LaneChangeSettings | None = None
 
 
 class FaultSettings(_Section):
-    """A degradation: a bias on one channel of the automation's command (core.degradation)."""
+    """A degradation of the automation (core.degradation); what its size means depends on its kind."""
 
-    channel: Literal["acceleration", "steering"]
+    kind: Literal[KINDS[1:]] = "bias"
+    channel: Literal["acceleration", "steering", "both"] = "steering"
     onset: core.NonNegative  # [s]
-    ramp: core.NonNegative  # [s]
-    size: float  # [m/s^2] or [rad]
+    ramp: core.NonNegative = 0.0  # [s]
+    duration: core.Positive | None = None  # [s]; None for a permanent one
+    period: core.NonNegative = 0.0  # of one that comes and goes [s]; 0 for one that stays
+    duty: core.Fraction = 0.5  # share of the period in which it is there
+    size: float | None = None
+    time_constant: core.Positive = 0.5  # of coloured noise [s]
+    frequency: core.Positive = 0.5  # of an oscillation [Hz]
+    seed: Annotated[int, Ge(0)] | None = None  # of noise; None to have it drawn
+
+
+class RandomSettings(_Section):
+    """A setting drawn at the start of each episode: uniform between two ends, or one of several values."""
+
+    setting: str  # its path, such as "ego.speed" or "vehicles.0.position"
+    low: float | None = None
+    high: float | None = None
+    choices: list[float] | None = None
 
 
 class AuthoritySettings(_Section):
@@ -96,7 +139,7 @@ class SolverSettings(_Section):
     first_iterations: core.Count = 5
 
 
-_TASK_FROM_ROAD = ("dt", "lane_width", "road_low", "road_high", "y_target")
+_TASK_FROM_ROAD = ("dt", "lane_width", "road_low", "road_high", "y_target", "y_goal", "change_onset", "change_duration")
 _Longitudinal = _section(
     "_Longitudinal", core.LongitudinalRiskParameters, "graded", preset=(Literal["paper", "graded"], "graded")
 )
@@ -129,8 +172,11 @@ class Settings(_Section):
     duration: core.Positive = 10.0  # [s]
     road: RoadSettings = RoadSettings()
     ego: EgoSettings = EgoSettings()
+    lane_change: LaneChangeSettings | None = None  # of the ego; None to keep the lane
     vehicles: list[VehicleSettings] = []
     faults: list[FaultSettings] = []
+    degradations: list[Literal[tuple(DEGRADATIONS)]] = []  # one of these is drawn at the start of each episode
+    randomise: list[RandomSettings] = []
     task: _Task = _Task()
     authority: AuthoritySettings = AuthoritySettings()
     law_tolerances: _Law = _Law()
@@ -193,6 +239,8 @@ def check(config: Mapping[str, Any]) -> Settings:
     except ValidationError as error:
         raise ValueError(_explain(error)) from None
     _check_time(settings)
+    _check_faults(settings)
+    _check_random(settings, config)
     _check_spawn(settings)
     _check_vehicle(settings)
     return settings
@@ -231,6 +279,44 @@ def _check_time(settings: Settings) -> None:
         raise ValueError(f"config['duration'] = {settings.duration} s must be at least one step of {1 / policy} s")
 
 
+def _check_faults(settings: Settings) -> None:
+    """Sizes that their kinds allow."""
+    longest = (MAX_DELAY - 1) / settings.policy_frequency
+    for i, fault in enumerate(settings.faults):
+        name = f"config['faults'][{i}]['size']"
+        if fault.kind in WITHOUT_SIZE:
+            continue
+        if fault.size is None:
+            raise ValueError(f"{name} is missing; {fault.kind} needs one")
+        low, high = -math.inf, math.inf
+        if fault.kind in SHARES:
+            low, high = 0.0, 1.0
+        elif fault.kind in TIMES:
+            low, high = 0.0, longest
+        elif fault.kind in NOISES or fault.kind == "rate_limit":
+            low = 0.0
+        if not low <= fault.size <= high:
+            raise ValueError(f"{name} = {fault.size} must lie in [{low:g}, {high:g}] for {fault.kind}")
+
+
+def _check_random(settings: Settings, config: Mapping[str, Any]) -> None:
+    """Paths that name a setting, and something to draw from."""
+    for i, entry in enumerate(settings.randomise):
+        name = f"config['randomise'][{i}]"
+        valid: Any = config
+        for key in entry.setting.split("."):
+            if isinstance(valid, list) and key.isdigit() and int(key) < len(valid):
+                valid = valid[int(key)]
+            elif isinstance(valid, Mapping) and key in valid:
+                valid = valid[key]
+            else:
+                keys = range(len(valid)) if isinstance(valid, list) else valid if isinstance(valid, Mapping) else ()
+                raise ValueError(f"{name}['setting'] = {entry.setting!r}: no setting {key!r}; {_nearest(key, keys)}")
+        uniform = entry.low is not None and entry.high is not None and entry.low <= entry.high
+        if uniform == bool(entry.choices):
+            raise ValueError(f"{name} = {entry.model_dump()} must have either low <= high or choices")
+
+
 def _check_spawn(settings: Settings) -> None:
     """Lanes that exist, a road that does not meet itself, and no two vehicles in one place."""
     turned = sum(abs(segment.curvature) * segment.length for segment in settings.road.segments)
@@ -262,6 +348,11 @@ def _check_spawn(settings: Settings) -> None:
                 f"{name}['position'] = {vehicle.position} m is not on the road, [{-LEAD_IN}, {road_length}] m"
             )
         placed.append((name, vehicle.lane, vehicle.position))
+    changes = [("config", settings.lane_change)]
+    changes += [(f"config['vehicles'][{i}]", vehicle.lane_change) for i, vehicle in enumerate(settings.vehicles)]
+    for name, change in changes:
+        if change is not None and change.lane >= lanes:
+            raise ValueError(f"{name}['lane_change']['lane'] = {change.lane} must lie in [0, {lanes - 1}]")
     for i, (name, lane, position) in enumerate(placed):
         if lane >= lanes:
             raise ValueError(f"{name}['lane'] = {lane} must lie in [0, {lanes - 1}]")
@@ -296,7 +387,7 @@ def parameters_of(settings: Settings) -> core.Parameters:
 
     longitudinal = values(settings.longitudinal_risk)
     longitudinal["graded"] = longitudinal.pop("preset") == "graded"
-    width = settings.road.lane_width
+    width, change = settings.road.lane_width, settings.lane_change
     return core.Parameters(
         vehicle=core.VehicleParameters(**values(settings.vehicle)),
         limits=core.Limits(**values(settings.limits)),
@@ -315,6 +406,9 @@ def parameters_of(settings: Settings) -> core.Parameters:
             road_low=-0.5 * width,
             road_high=settings.lane_centre(settings.road.lanes) - 0.5 * width,
             y_target=settings.lane_centre(settings.ego.lane),
+            y_goal=settings.lane_centre(settings.ego.lane if change is None else change.lane),
+            change_onset=math.inf if change is None else change.onset,
+            change_duration=4.0 if change is None else change.duration,
         ),
         authority=core.AuthorityParameters(
             law=LAWS.index(settings.authority.law),
@@ -324,10 +418,44 @@ def parameters_of(settings: Settings) -> core.Parameters:
     )
 
 
-def fault_rows(settings: Settings) -> np.ndarray:
-    """Faults as rows of :func:`core.degradation.bias`, shape (n, 4)."""
-    rows = [[CHANNELS.index(f.channel), f.onset, f.ramp, f.size] for f in settings.faults]
-    return np.array(rows, dtype=float).reshape(-1, 4)
+def fault_records(settings: Settings) -> np.ndarray:
+    """Faults as records of :class:`core.DegradationParameters`, shape (n,)."""
+    records = np.zeros(len(settings.faults), record_dtype(core.DegradationParameters))
+    for i, fault in enumerate(settings.faults):
+        records[i] = pack(
+            core.DegradationParameters(
+                kind=KINDS.index(fault.kind),
+                acceleration=fault.channel != "steering",
+                steering=fault.channel != "acceleration",
+                onset=fault.onset,
+                ramp=fault.ramp,
+                duration=math.inf if fault.duration is None else fault.duration,
+                period=fault.period,
+                duty=fault.duty,
+                size=fault.size or 0.0,
+                time_constant=fault.time_constant,
+                frequency=fault.frequency,
+                seed=fault.seed or 0,
+            )
+        )
+    return records
+
+
+def plan_records(settings: Settings) -> np.ndarray:
+    """The other vehicles' plans as records of :class:`core.TrafficParameters`, shape (n,)."""
+    records = np.zeros(len(settings.vehicles), record_dtype(core.TrafficParameters))
+    for i, vehicle in enumerate(settings.vehicles):
+        plan = core.TrafficParameters(
+            follows=vehicle.behaviour == "idm", desired_speed=vehicle.desired_speed or max(vehicle.speed, 1.0)
+        )
+        if vehicle.brake is not None:
+            plan = plan._replace(brake_onset=vehicle.brake.onset, deceleration=vehicle.brake.deceleration)
+        change = vehicle.lane_change
+        if change is not None:
+            shift = settings.lane_centre(change.lane) - settings.lane_centre(vehicle.lane)
+            plan = plan._replace(change_onset=change.onset, change_duration=change.duration, shift=shift)
+        records[i] = pack(plan)
+    return records
 
 
 def plain(settings: Settings) -> dict[str, Any]:

@@ -22,11 +22,14 @@ class LineRoad(Road):
     Attributes:
         line: reference line, shape (n, 6).
         rows: all vehicles as rows of the traffic array, the ego first, shape (n_vehicles, 8).
+        lane_width: [m].
+        time: since the start of the episode [s].
     """
 
     def __init__(self, line: np.ndarray, lanes: int, lane_width: float, **options: Any) -> None:
         super().__init__(network=road_network(line, lanes, lane_width), **options)
-        self.line = line
+        self.line, self.lane_width = line, lane_width
+        self.time, self._frames = 0.0, 0
         self.rows = np.zeros((0, 8))
 
     def update_rows(self) -> np.ndarray:
@@ -42,6 +45,8 @@ class LineRoad(Road):
         """Move every vehicle by dt [s], then mark those that overlap as crashed."""
         for vehicle in self.vehicles:
             vehicle.step(dt)
+        self._frames += 1
+        self.time = self._frames * dt  # not a sum, which would drift
         self._crashed[:] = False
         if find_collisions(self.update_rows(), self._crashed):
             for index in np.flatnonzero(self._crashed):

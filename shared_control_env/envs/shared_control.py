@@ -12,18 +12,18 @@ from highway_env.vehicle.graphics import VehicleGraphics
 
 from shared_control_env.controllers.automation import Automation
 from shared_control_env.core import single
-from shared_control_env.core.degradation import ONSET
 from shared_control_env.core.info import INFO, as_dict
-from shared_control_env.core.records import HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
+from shared_control_env.core.records import FAULT_MEMORY, HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
 from shared_control_env.core.reward import TERMS
 from shared_control_env.core.safe_area import triangulate
 from shared_control_env.envs import config as configuration
 from shared_control_env.envs.action import SlotAction
+from shared_control_env.envs.episode import draw_episode
 from shared_control_env.envs.graphics import SharedControlViewer
 from shared_control_env.envs.observation import DriverObservation
 from shared_control_env.envs.roads import LineRoad
 from shared_control_env.envs.situation import Situation, start_of
-from shared_control_env.envs.vehicles import EgoVehicle
+from shared_control_env.envs.vehicles import EgoVehicle, LaneFollower
 
 
 class SharedControlEnv(AbstractEnv):
@@ -42,6 +42,7 @@ class SharedControlEnv(AbstractEnv):
 
     Attributes:
         settings: checked settings; ``config`` is the same as a plain dict.
+        episode: settings of the present episode, with all that is random drawn.
         parameters: record of :class:`Parameters` that the core runs with.
         scene: record of :data:`records.SCENE`, the present scene with its safe area.
         signals: record of :data:`records.SIGNALS`: planned for the present scene after a reset or step.
@@ -137,10 +138,12 @@ class SharedControlEnv(AbstractEnv):
         return self.observation.copy(), info
 
     def _reset(self) -> None:
-        """Make road, vehicles and controllers from the settings."""
-        settings = self.settings
+        """Draw the episode; make road, vehicles and controllers from its settings."""
+        settings = self.episode = draw_episode(self.settings, self.np_random)
         start = start_of(settings)
         self.line, self.faults, self.parameters = start.line, start.faults, start.parameters
+        self._fault_memories = np.zeros(len(self.faults), FAULT_MEMORY)
+        self.scene["felt"] = 0.0
         self.command_limits = np.array(list(self.parameters["limits"][()]))
         self.road = LineRoad(
             self.line,
@@ -161,14 +164,15 @@ class SharedControlEnv(AbstractEnv):
 
     def _place_vehicles(self, start: Situation) -> None:
         """Put the ego and the other vehicles on the road."""
-        ego = EgoVehicle(self.road, start.ego, self.settings.task.target_speed, self.parameters)
+        ego = EgoVehicle(self.road, start.ego, self.episode.task.target_speed, self.parameters)
         ego.color = VehicleGraphics.EGO_COLOR
         self.controlled_vehicles = [ego]
         self.road.vehicles = [ego]
-        for x, y, heading, speed in start.traffic[:, [X, Y, HEADING, SPEED]]:
-            self.road.vehicles.append(
-                self._vehicle_class(self.road, (x, y), heading=float(heading), speed=float(speed))
-            )
+        for (x, y, heading, speed), plan in zip(start.traffic[:, [X, Y, HEADING, SPEED]], start.plans, strict=True):
+            vehicle = self._vehicle_class(self.road, (x, y), heading=float(heading), speed=float(speed))
+            if isinstance(vehicle, LaneFollower):
+                vehicle.plan[()] = plan
+            self.road.vehicles.append(vehicle)
 
     def _perceive_and_plan(self) -> None:
         """Perceive the scene, find its safe area, let the automation decide, degrade it, assess the risk."""
@@ -178,11 +182,13 @@ class SharedControlEnv(AbstractEnv):
         count = single.sense(self.steps, state, self.traffic, self.line, p, scene, self._corners)
         start, end, low, high = scene["region"].tolist()
         single.search(triangulate(start, end, low, high, self._corners[:count]), p, scene)
+        y, v_target = single.misjudge(scene, self.faults, p, signals)
         self.solution = self.automation.act(scene)
+        single.judge_rightly(scene, y, v_target)
         signals["u_a_des"] = self.solution.command
         signals["status"], signals["iterations"] = self.solution.status, self.solution.iterations
         signals["residual"] = self.solution.dual_residual
-        single.monitor(scene, self.traffic, self.line, self.faults, p, signals)
+        single.monitor(scene, self.traffic, self.line, self.faults, self._fault_memories, p, signals)
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Drive one time step.
@@ -198,7 +204,7 @@ class SharedControlEnv(AbstractEnv):
         """
         command, alpha_a = self.action_type.decode(action)
         last_a, previous_s = float(self.memory["u"][0]), float(self.scene["z"][0])
-        single.blend(command, alpha_a, self.parameters, self.memory, self.signals)
+        single.blend(command, alpha_a, self.parameters, self.scene, self.memory, self.signals)
         info = self._note_signals()
         self._simulate(self.signals["u"])
         self._perceive_and_plan()
@@ -245,8 +251,9 @@ class SharedControlEnv(AbstractEnv):
 
     @property
     def fault_active(self) -> bool:
-        """Whether any degradation has set in at the scene's time."""
-        return bool((self.faults[:, ONSET] <= self.scene["t"]).any())
+        """Whether any degradation is there at the scene's time."""
+        t = self.scene["t"]
+        return bool(((self.faults["onset"] <= t) & (t < self.faults["onset"] + self.faults["duration"])).any())
 
     @property
     def traffic(self) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, SPEED, pack
 from shared_control_env.core.road import curvature_at, point_at, reference_line
 from shared_control_env.core.traffic import follow_lane
-from shared_control_env.envs.config import LEAD_IN, Settings, fault_rows, parameters_of
+from shared_control_env.envs.config import LEAD_IN, Settings, fault_records, parameters_of, plan_records
 
 TRAFFIC_BODY = (5.0, 2.0)
 """Length and width of highway-env's vehicles [m]."""
@@ -20,10 +20,11 @@ class Situation(NamedTuple):
 
     Attributes:
         line: reference line of the road, shape (n, 6).
-        faults: degradations, shape (m, 4).
+        faults: degradations as records of :class:`core.parameters.DegradationParameters`, shape (m,).
         parameters: record of :class:`core.parameters.Parameters`.
         ego: state [x, y, psi, v_x, v_y, r], shape (6,).
         traffic: other vehicles as rows of :mod:`core.records`' traffic columns, shape (n_vehicles, 8).
+        plans: what they are going to do, records of :class:`core.parameters.TrafficParameters`, shape (n_vehicles,).
     """
 
     line: np.ndarray
@@ -31,6 +32,7 @@ class Situation(NamedTuple):
     parameters: np.ndarray
     ego: np.ndarray
     traffic: np.ndarray
+    plans: np.ndarray
 
 
 def start_of(settings: Settings) -> Situation:
@@ -44,5 +46,5 @@ def start_of(settings: Settings) -> Situation:
     for row, vehicle in zip(traffic, settings.vehicles, strict=True):
         row[:3] = point_at(line, vehicle.position, settings.lane_centre(vehicle.lane))
         row[SPEED], row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.speed, *TRAFFIC_BODY
-        follow_lane(row, line, 0.0)
-    return Situation(line, fault_rows(settings), pack(parameters_of(settings)), ego, traffic)
+        follow_lane(row, line, 0.0, 0.0)
+    return Situation(line, fault_records(settings), pack(parameters_of(settings)), ego, traffic, plan_records(settings))

@@ -10,6 +10,7 @@ from highway_env.road.road import LaneIndex, Road
 from highway_env.vehicle.kinematics import Vehicle
 
 from shared_control_env.core import single
+from shared_control_env.core.parameters import TrafficParameters
 from shared_control_env.core.records import (
     ACCELERATION,
     BODY_LENGTH,
@@ -19,8 +20,8 @@ from shared_control_env.core.records import (
     YAW_RATE,
     X,
     Y,
+    pack,
 )
-from shared_control_env.core.traffic import follow_lane
 
 
 class ArrayVehicle(Vehicle):
@@ -110,7 +111,11 @@ class EgoVehicle(ArrayVehicle):
 
 
 class LaneFollower(ArrayVehicle):
-    """Traffic of the paper's cases: constant speed along its lane. ``array`` is its row of the traffic array."""
+    """Traffic that follows its lane and its plan (:mod:`core.traffic`). ``array`` is its row of the traffic array.
+
+    Attributes:
+        plan: record of :class:`TrafficParameters`; by default constant speed, as in the paper's cases.
+    """
 
     _POSE = (X, Y, HEADING, SPEED)
     _SIZE = 8
@@ -118,14 +123,19 @@ class LaneFollower(ArrayVehicle):
     def __init__(self, road: Road, position: Any, heading: float = 0.0, speed: float = 0.0) -> None:
         super().__init__(road, position, heading, speed)
         self.array[BODY_LENGTH], self.array[BODY_WIDTH] = self.LENGTH, self.WIDTH
+        self.plan = pack(TrafficParameters())
         self.step(0.0)
 
     def act(self, action: dict | str | None = None) -> None:
-        """Nothing to decide."""
+        """Decide on the acceleration."""
+        road = self.road
+        single.decide_acceleration(
+            self.array, self.plan, road.time, road.rows[0], road.rows[1:], road.line, road.lane_width
+        )
 
     def step(self, dt: float) -> None:
         """Advance along the lane by dt [s]."""
-        follow_lane(self.array, self.road.line, dt)
+        single.move(self.array, self.plan, self.road.line, self.road.time, dt)
 
 
 def write_row(vehicle: Vehicle, row: np.ndarray) -> None:

@@ -17,9 +17,20 @@ from gymnasium.vector.utils import batch_space
 from shared_control_env.core.delaunay import MAX_HOLES
 from shared_control_env.core.info import INFO
 from shared_control_env.core.observation import FEATURES
-from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, SIGNALS
+from shared_control_env.core.parameters import DegradationParameters, Parameters, TrafficParameters
+from shared_control_env.core.records import (
+    AUTOMATION_MEMORY,
+    FAULT_MEMORY,
+    MEMORY,
+    SCENE,
+    SIGNALS,
+    record_dtype,
+)
+from shared_control_env.core.road import S0
 from shared_control_env.envs import config as configuration
-from shared_control_env.envs.cases import CURVE, TWO_LANE, Case
+from shared_control_env.envs.cases import CASES, Case
+from shared_control_env.envs.config import Settings, plain
+from shared_control_env.envs.episode import draw_episode, is_random
 from shared_control_env.envs.situation import start_of
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, space_of
 from shared_control_env.vector import kernel
@@ -33,6 +44,7 @@ from shared_control_env.vector.records import (
     Batch,
     Outputs,
     Setup,
+    Starts,
 )
 
 AUTORESET = {
@@ -143,6 +155,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
         self._seeds: tuple[int | None, ...] = (None,) * num_envs
+        self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._started = False
         self._set_up()
 
@@ -169,13 +182,14 @@ class SharedControlVectorEnv(VectorEnv):
                 f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}"
             )
         self.metadata["render_fps"] = settings.policy_frequency
-        start = start_of(settings)
         self._path = np.zeros((settings.steps + 1, 2))
+        self._random = is_random(settings)
+        self._episodes, self._prepared = [settings] * n, [settings] * n
+        starts = _no_starts(n if self._random else 1, settings)
+        if not self._random:
+            _write_start(settings, starts, 0)
         self._setup = Setup(
-            line=start.line,
-            faults=start.faults,
-            state=start.ego,
-            traffic=start.traffic,
+            starts=starts,
             steps=settings.steps,
             frames=settings.simulation_frequency // settings.policy_frequency,
             dt=1.0 / settings.simulation_frequency,
@@ -183,13 +197,17 @@ class SharedControlVectorEnv(VectorEnv):
             autoreset=AUTORESET[self._mode],
         )
         self._batch = Batch(
-            parameters=np.full(n, start.parameters),
+            parameters=np.zeros(n, starts.parameters.dtype),
             scenes=np.zeros(n, SCENE),
             signals=np.zeros(n, SIGNALS),
             memories=np.zeros(n, MEMORY),
             automations=np.zeros(n, AUTOMATION_MEMORY),
             states=np.zeros((n, 6)),
-            traffic=np.zeros((n, *start.traffic.shape)),
+            lines=np.zeros((n, *starts.lines.shape[1:])),
+            faults=np.zeros((n, *starts.faults.shape[1:]), starts.faults.dtype),
+            fault_memories=np.zeros((n, *starts.faults.shape[1:]), FAULT_MEMORY),
+            traffic=np.zeros((n, *starts.traffic.shape[1:])),
+            plans=np.zeros((n, *starts.plans.shape[1:]), starts.plans.dtype),
             crashed=np.zeros(n, dtype=bool),
             ended=np.zeros(n, dtype=bool),
         )
@@ -200,6 +218,11 @@ class SharedControlVectorEnv(VectorEnv):
         return configuration.plain(self._settings)
 
     @property
+    def episodes(self) -> tuple[Settings, ...]:
+        """Settings of the present episode of each environment, with all that is random drawn."""
+        return tuple(self._episodes)
+
+    @property
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
         """Seed of each environment, None where it was not given one."""
         return self._seeds
@@ -207,7 +230,8 @@ class SharedControlVectorEnv(VectorEnv):
     @property
     def bytes_per_environment(self) -> int:
         """Memory of one environment's state [B]."""
-        return sum(array.nbytes for array in self._batch) // self.num_envs
+        starts = self._setup.starts if self._random else ()
+        return sum(array.nbytes for array in (*self._batch, *starts)) // self.num_envs
 
     def reset(
         self,
@@ -245,8 +269,11 @@ class SharedControlVectorEnv(VectorEnv):
         out = self._outputs()
         if self._started:  # Environments that the mask leaves out keep their last observation.
             out.observations[:] = self._observations
+        if self._random and not self._started:  # those without a seed
+            self._prepare(np.array([generator is None for generator in self._generators]))
         self._advance(1, mask, mask, self._no_actions, out)
         self._started = True
+        self._begin_next(mask)
         self._finish(out)
         return out.observations, self._infos(out.infos, out.solver, mask)
 
@@ -270,7 +297,7 @@ class SharedControlVectorEnv(VectorEnv):
             index = int(np.flatnonzero(self._batch.ended)[0])
             raise ValueError(f"environment {index} has ended; reset it with options={{'reset_mask': ...}}")
         out = self._outputs()
-        self._advance(1, self._everyone, self._nobody, checked, out)
+        self._drive(checked, out)
         self._finish(out)
         infos = self._infos(out.infos, out.solver, np.ones(self.num_envs, dtype=bool))
         ended = out.terminations | out.truncations
@@ -296,15 +323,23 @@ class SharedControlVectorEnv(VectorEnv):
         if not self._started:
             raise ValueError("rollout() needs a reset() first")
         out = self._outputs()
-        result = self._advance(steps, self._everyone, self._nobody, self._no_actions, out)
+        if self._random:  # every episode begins with a draw
+            taken = [self._drive(self._no_actions, out) for _ in range(steps)]
+            result = Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
+        else:
+            result = self._advance(steps, self._everyone, self._nobody, self._no_actions, out)
         self._finish(out)
         return result
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Draw environment 0; in ``rgb_array`` mode a tuple of its frame."""
         if self._viewer_env is None:
-            make: Any = load_env_creator(self._case.environment)
-            self._viewer_env = make(self.config, render_mode=self.render_mode)
+            make: Any = load_env_creator("shared_control_env.envs.shared_control:SharedControlEnv")
+            self._viewer_env = make(plain(self._episodes[0]), render_mode=self.render_mode)
+            self._shown = self._episodes[0]
+        if self._shown is not self._episodes[0]:
+            self._shown = self._episodes[0]
+            self._viewer_env.reset(options={"config": plain(self._shown)})
         batch = self._batch
         k = int(batch.scenes[0]["k"])
         self._viewer_env.show(batch.states[0], batch.traffic[0], batch.scenes[0], batch.signals[0], self._path[: k + 1])
@@ -317,6 +352,29 @@ class SharedControlVectorEnv(VectorEnv):
             self._viewer_env.close()
         if self._pool is not None:
             self._pool.shutdown()
+
+    def _prepare(self, mask: np.ndarray) -> None:
+        """Draw the next episode of the environments that the mask names."""
+        for i in np.flatnonzero(mask).tolist():
+            generator = self._generators[i]
+            if generator is None:
+                generator = self._generators[i] = seeding.np_random(None)[0]
+            self._prepared[i] = draw_episode(self._settings, generator)
+            _write_start(self._prepared[i], self._setup.starts, i)
+
+    def _begin_next(self, mask: np.ndarray) -> None:
+        """Note that the environments that the mask names have begun what was prepared, and prepare the next."""
+        if self._random and mask.any():
+            for i in np.flatnonzero(mask).tolist():
+                self._episodes[i] = self._prepared[i]
+            self._prepare(mask)
+
+    def _drive(self, actions: Actions, out: Outputs) -> Rollout:
+        """One step of all environments."""
+        resetting = self._batch.ended.copy()
+        result = self._advance(1, self._everyone, self._nobody, actions, out)
+        self._begin_next(result.ends[0] if self._mode is AutoresetMode.SAME_STEP else resetting)
+        return result
 
     def _advance(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
         """Run :func:`kernel.advance`, the environments split over the threads; it lets go of Python's lock."""
@@ -415,7 +473,7 @@ class SharedControlVectorEnv(VectorEnv):
         return mask
 
     def _take_seeds(self, seed: int | Sequence[int | None] | None, mask: np.ndarray) -> None:
-        """Seed of each environment. The scenarios of version 0 draw nothing, so that none is used yet."""
+        """Seed the generators of the environments that the mask names, and draw their next episodes anew."""
         if seed is None:
             return
         seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else list(seed)
@@ -423,9 +481,12 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(
                 f"seed has {len(seeds)} entries; it must be an int or have one for each of {self.num_envs}"
             )
-        for value in seeds:
-            if value is not None:
-                seeding.np_random(int(value))  # raises for a seed that Gymnasium would refuse
+        generators = [None if value is None else seeding.np_random(int(value))[0] for value in seeds]
+        seeded = np.array([generator is not None for generator in generators]) & mask
+        for i in np.flatnonzero(seeded).tolist():
+            self._generators[i] = generators[i]
+        if self._random:
+            self._prepare(seeded)
         self._seeds = tuple(new if chosen else old for new, old, chosen in zip(seeds, self._seeds, mask, strict=True))
 
 
@@ -439,11 +500,59 @@ def _batched(records: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
     return values
 
 
-def two_lane(num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
-    """``SharedControl/TwoLane-v0``, N times; see :class:`SharedControlVectorEnv`."""
-    return SharedControlVectorEnv(TWO_LANE, num_envs, **options)
+def _no_starts(n: int, settings: Settings) -> Starts:
+    """Arrays for n starts, large enough for whatever the settings draw."""
+    faults = len(settings.faults) + (1 if settings.degradations else 0)
+    vehicles = len(settings.vehicles)
+    return Starts(
+        parameters=np.zeros(n, record_dtype(Parameters)),
+        states=np.zeros((n, 6)),
+        lines=np.zeros((n, _most_rows(settings), 6)),
+        faults=np.zeros((n, faults), record_dtype(DegradationParameters)),
+        traffic=np.zeros((n, vehicles, 8)),
+        plans=np.zeros((n, vehicles), record_dtype(TrafficParameters)),
+    )
 
 
-def curve(num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
-    """``SharedControl/Curve-v0``, N times; see :class:`SharedControlVectorEnv`."""
-    return SharedControlVectorEnv(CURVE, num_envs, **options)
+def _most_rows(settings: Settings) -> int:
+    """Rows of the reference line: one for the lead-in and one for every segment, more where arcs are long.
+
+    The whole road turns by at most 2 pi, in pieces of up to pi / 2.
+    """
+    if any(entry.setting.startswith("road") for entry in settings.randomise):
+        return 1 + len(settings.road.segments) + 4
+    return len(start_of(settings).line)
+
+
+def _write_start(settings: Settings, starts: Starts, i: int) -> None:
+    """Write an episode's start as entry i; what is left of a line begins at infinity, of the faults is none."""
+    start = start_of(settings)
+    starts.parameters[i], starts.states[i] = start.parameters[()], start.ego
+    starts.lines[i] = 0.0
+    starts.lines[i, :, S0] = np.inf
+    starts.lines[i, : len(start.line)] = start.line
+    starts.faults[i] = np.zeros((), starts.faults.dtype)
+    starts.faults[i, : len(start.faults)] = start.faults
+    starts.traffic[i], starts.plans[i] = start.traffic, start.plans
+
+
+class Vectorised:
+    """What ``gym.make_vec`` calls for one scenario: N of its environments; see :class:`SharedControlVectorEnv`.
+
+    Args:
+        case: the scenario.
+    """
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+
+    def __call__(self, num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
+        """N environments of the scenario."""
+        return SharedControlVectorEnv(self.case, num_envs, **options)
+
+
+def __getattr__(name: str) -> Vectorised:
+    """The entry point of a scenario, by its key in :data:`cases.CASES`."""
+    if name not in CASES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return Vectorised(CASES[name])

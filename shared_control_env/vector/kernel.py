@@ -12,10 +12,10 @@ from shared_control_env.core.info import note_outcome, note_signals
 from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.observation import observe
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, Record, X, Y
+from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, SPEED, Record, X, Y
 from shared_control_env.core.safe_area import search_triangles, whole_region
 from shared_control_env.core.scene import holes_in_region, perceive
-from shared_control_env.core.traffic import follow_lane
+from shared_control_env.core.traffic import decide_acceleration, move
 from shared_control_env.vector.records import NEXT_STEP, SAME_STEP, Batch, Outputs, Setup
 
 
@@ -35,13 +35,16 @@ def find_area(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameter
 def perceive_and_plan(i: int, k: int, batch: Batch, setup: Setup, work: Record) -> None:
     """Perceive environment i's scene at time step k, let the automation decide, degrade it, assess the risk."""
     p, scene, signals = batch.parameters[i], batch.scenes[i], batch.signals[i]
-    perceive(k, batch.states[i], batch.traffic[i], setup.line, p, scene)
-    find_area(scene, batch.traffic[i], setup.line, p, work)
+    line, faults = batch.lines[i], batch.faults[i]
+    perceive(k, batch.states[i], batch.traffic[i], line, p, scene)
+    find_area(scene, batch.traffic[i], line, p, work)
     automation = batch.automations[i]
+    y, v_target = closed_loop.misjudge(scene, faults, p, signals)
     status, iterations, residual = closed_loop.automate(scene, p, automation, work.solver)
+    closed_loop.judge_rightly(scene, y, v_target)
     signals.status, signals.iterations, signals.residual = status, iterations, residual
     signals.u_a_des[0], signals.u_a_des[1] = automation.u_a_des[0], automation.u_a_des[1]
-    closed_loop.monitor(scene, batch.traffic[i], setup.line, setup.faults, p, signals)
+    closed_loop.monitor(scene, batch.traffic[i], line, faults, batch.fault_memories[i], p, signals)
 
 
 @jit_inlined
@@ -108,12 +111,17 @@ def decide(
 def simulate(i: int, batch: Batch, setup: Setup, work: Record) -> None:
     """Move environment i's vehicles through one decision's simulation steps and check the ego's collisions."""
     p, u, state, traffic, row = batch.parameters[i], batch.signals[i].u, batch.states[i], batch.traffic[i], work.row
+    line, plans = batch.lines[i], batch.plans[i]
     row[BODY_LENGTH], row[BODY_WIDTH] = p.vehicle.length, p.vehicle.width
-    for _ in range(setup.frames):
+    for frame in range(setup.frames):
+        t = (batch.scenes[i].k * setup.frames + frame) * setup.dt
+        row[X], row[Y], row[SPEED] = state[0], state[1], state[3]
+        for j in range(traffic.shape[0]):
+            decide_acceleration(traffic[j], plans[j], t, row, traffic, line, p.task.lane_width)
         plant_step(state, u[0], u[1], setup.dt, p.vehicle, work.plant)
         row[X], row[Y], row[HEADING] = state[0], state[1], state[2]
         for j in range(traffic.shape[0]):
-            follow_lane(traffic[j], setup.line, setup.dt)
+            move(traffic[j], plans[j], line, t, setup.dt)
         for j in range(traffic.shape[0]):
             if overlap(row, traffic[j]):
                 batch.crashed[i] = True
@@ -134,19 +142,35 @@ def apply(
     """First half of a decision of environment i: both slots, the loop's commands, the vehicles' motion."""
     scene, signals, memory = batch.scenes[i], batch.signals[i], batch.memories[i]
     alpha_a = decide(i, commands, alphas, batch, setup, work, programs, share, out.solver[i])
-    closed_loop.blend(work.command, alpha_a, batch.parameters[i], memory, signals)
-    note_signals(scene, signals, setup.faults, batch.automations[i].failures, out.infos[i])
+    closed_loop.blend(work.command, alpha_a, batch.parameters[i], scene, memory, signals)
+    note_signals(scene, signals, batch.faults[i], batch.automations[i].failures, out.infos[i])
     simulate(i, batch, setup, work)
+
+
+@jit
+def copy_rows(source: np.ndarray, target: np.ndarray) -> None:
+    """Copy an array of rows into another of the same shape."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
 
 
 @jit_inlined
 def restore(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
-    """Put environment i back to its start."""
-    for n in range(6):
-        batch.states[i, n] = setup.state[n]
-    for j in range(setup.traffic.shape[0]):
-        for n in range(8):
-            batch.traffic[i, j, n] = setup.traffic[j, n]
+    """Begin the episode that is prepared for environment i."""
+    starts = setup.starts
+    n = i % starts.parameters.shape[0]
+    batch.parameters[i] = starts.parameters[n]
+    copy_rows(starts.lines[n], batch.lines[i])
+    copy_rows(starts.traffic[n], batch.traffic[i])
+    for j in range(6):
+        batch.states[i, j] = starts.states[n, j]
+    for j in range(starts.faults.shape[1]):
+        batch.faults[i, j] = starts.faults[n, j]
+    for j in range(starts.plans.shape[1]):
+        batch.plans[i, j] = starts.plans[n, j]
+    closed_loop.clear_faults(batch.fault_memories[i])
+    batch.scenes[i].felt[0] = batch.scenes[i].felt[1] = 0.0
     batch.crashed[i] = batch.ended[i] = False
     closed_loop.clear_memory(batch.memories[i])
     closed_loop.clear_automation(batch.automations[i])
@@ -160,7 +184,7 @@ def restore(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
 def note_start(i: int, batch: Batch, setup: Setup, out: Outputs, work: Record) -> None:
     """Info of a reset: the signals planned for k = 0, and nothing that came of them yet."""
     scene, info = batch.scenes[i], out.infos[i]
-    note_signals(scene, batch.signals[i], setup.faults, batch.automations[i].failures, info)
+    note_signals(scene, batch.signals[i], batch.faults[i], batch.automations[i].failures, info)
     for n in range(work.terms.shape[0]):
         work.terms[n] = 0.0
     on_road = closed_loop.is_on_road(scene, batch.parameters[i])
@@ -198,7 +222,7 @@ def advance_one(
             previous_s, last_a, batch.crashed[i], scene, signals, p, memory, work.terms, out.infos[i]
         )
         out.truncations[i] = scene.k >= setup.steps
-    observe(scene, memory, setup.line, p, out.observations[i])
+    observe(scene, memory, batch.lines[i], p, out.observations[i])
 
 
 @jit_inlined

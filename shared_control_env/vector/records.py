@@ -23,7 +23,11 @@ class Batch(NamedTuple):
         memories: of :data:`records.MEMORY`, (N,).
         automations: of :data:`records.AUTOMATION_MEMORY`, (N,).
         states: ego ``[x, y, psi, v_x, v_y, r]``, (N, 6).
+        lines: reference lines of the roads, (N, n, 6).
+        faults: records of :class:`core.parameters.DegradationParameters`, (N, m).
+        fault_memories: of :data:`records.FAULT_MEMORY`, (N, m).
         traffic: other vehicles, (N, M, 8).
+        plans: what they are going to do, records of :class:`core.parameters.TrafficParameters`, (N, M).
         crashed: whether the ego has collided, (N,).
         ended: whether the episode has ended and awaits its reset, (N,).
     """
@@ -34,19 +38,35 @@ class Batch(NamedTuple):
     memories: np.ndarray
     automations: np.ndarray
     states: np.ndarray
+    lines: np.ndarray
+    faults: np.ndarray
+    fault_memories: np.ndarray
     traffic: np.ndarray
+    plans: np.ndarray
     crashed: np.ndarray
     ended: np.ndarray
+
+
+class Starts(NamedTuple):
+    """What the next episode of each environment starts from: N entries, or one for all where nothing is drawn.
+
+    Attributes:
+        parameters, states, lines, faults, traffic, plans: as those of :class:`Batch`.
+    """
+
+    parameters: np.ndarray
+    states: np.ndarray
+    lines: np.ndarray
+    faults: np.ndarray
+    traffic: np.ndarray
+    plans: np.ndarray
 
 
 class Setup(NamedTuple):
     """What all environments share.
 
     Attributes:
-        line: reference line of the road, (n, 6).
-        faults: degradations, (m, 4).
-        state: ego at the start, (6,).
-        traffic: other vehicles at the start, (M, 8).
+        starts: of the next episodes.
         steps: length of an episode in decisions.
         frames: simulation steps of one decision.
         dt: of a simulation step [s].
@@ -54,10 +74,7 @@ class Setup(NamedTuple):
         autoreset: :data:`NEXT_STEP`, :data:`SAME_STEP` or :data:`DISABLED`.
     """
 
-    line: np.ndarray
-    faults: np.ndarray
-    state: np.ndarray
-    traffic: np.ndarray
+    starts: Starts
     steps: int
     frames: int
     dt: float

@@ -34,14 +34,15 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         if driver is not None and not isinstance(driver, Driver):
             raise ValueError(f"driver = {driver!r} must have reset(seed) and act(observation, scene) -> [a, delta]")
         self._given = driver
-        self.driver: Driver = driver or PredictiveDriver(parameters_of(self.shared.settings))
+        self.driver: Driver = driver or PredictiveDriver(parameters_of(self.shared.episode))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset environment and driver; the driver's seed is drawn from the environment's generator."""
         observation, info = self.env.reset(seed=seed, options=options)
-        if self._given is None and options and "config" in options:
-            self.driver = PredictiveDriver(parameters_of(self.shared.settings))
-        self.driver.reset(seed=int(self.shared.np_random.integers(2**31)))
+        if self._given is None:
+            self.driver = PredictiveDriver(parameters_of(self.shared.episode))
+        (own,) = self.shared.np_random.spawn(1)  # which takes nothing from the environment's own draws
+        self.driver.reset(seed=int(own.integers(2**31)))
         return observation, {**info, **self._report()}
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:

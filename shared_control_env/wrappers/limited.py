@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from shared_control_env.envs.scenarios import CurveEnv, TwoLaneEnv
+from shared_control_env.envs.cases import CASES
+from shared_control_env.envs.scenarios import scenario
 from shared_control_env.envs.shared_control import SharedControlEnv
 from shared_control_env.wrappers.authority_limiter import AuthorityLimiter
 
@@ -28,5 +29,8 @@ class Limited:
         return AuthorityLimiter(self.scenario(config, render_mode=render_mode))
 
 
-two_lane = Limited(TwoLaneEnv)
-curve = Limited(CurveEnv)
+def __getattr__(name: str) -> Limited:
+    """The entry point of a scenario, by its key in :data:`cases.CASES`."""
+    if name not in CASES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return Limited(scenario(name))

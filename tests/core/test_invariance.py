@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from shared_control_env.core import single
-from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import SIGNALS, pack
+from shared_control_env.core.parameters import DegradationParameters, Parameters
+from shared_control_env.core.records import FAULT_MEMORY, SIGNALS, pack, record_dtype
 from shared_control_env.core.road import PSI0, X0, Y0, point_at, reference_line
 from tests.scenes import scene_of
 
 PARAMETERS = pack(Parameters())
-FAULTS = np.empty((0, 4))
+NO_FAULTS = np.empty(0, record_dtype(DegradationParameters)), np.empty(0, FAULT_MEMORY)
 
 
 def risks(state, others, line, u):
     scene = scene_of(state, PARAMETERS, others, line)
     signals = np.zeros((), SIGNALS)
     signals["u_a_des"] = u
-    single.monitor(scene, others, line, FAULTS, PARAMETERS, signals)
+    single.monitor(scene, others, line, *NO_FAULTS, PARAMETERS, signals)
     return float(signals["r_x"]), float(signals["r_y"])
 
 

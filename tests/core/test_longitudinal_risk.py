@@ -59,16 +59,24 @@ def test_pair_risk_is_in_the_unit_interval_and_falls_with_distance(v_e, v_o, dx)
 
 def test_weights_and_absent_neighbours():
     near = np.array([[1.0, -1.0, 30.0], [1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
-    assert lr.longitudinal_risk(0.0, 15.0, near, 5.0, GRADED) == pytest.approx(1.0)
+    assert lr.longitudinal_risk(0.0, 15.0, near, 5.0, False, GRADED) == pytest.approx(1.0)
     for i, weight in enumerate((0.1, 0.2, 0.7)):
         only = near.copy()
         only[:, 0] = 0.0
         only[i, 0] = 1.0
-        assert lr.longitudinal_risk(0.0, 15.0, only, 5.0, GRADED) == pytest.approx(weight)
+        assert lr.longitudinal_risk(0.0, 15.0, only, 5.0, False, GRADED) == pytest.approx(weight)
 
 
 def test_bumper_to_bumper_is_nearer_than_centres():
     neighbours = np.array([[0, 0, 0], [0, 0, 0], [1.0, 15.0, 12.0]])
     to_bumper = GRADED._replace(bumper_to_bumper=True)
-    centres = lr.longitudinal_risk(0.0, 13.5, neighbours, 5.0, GRADED)
-    assert lr.longitudinal_risk(0.0, 13.5, neighbours, 5.0, to_bumper) > centres
+    centres = lr.longitudinal_risk(0.0, 13.5, neighbours, 5.0, False, GRADED)
+    assert lr.longitudinal_risk(0.0, 13.5, neighbours, 5.0, False, to_bumper) > centres
+
+
+def test_weights_of_a_lane_change_are_the_papers():
+    near = np.array([[1.0, -1.0, 30.0], [1.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
+    for i, weight in enumerate((0.8, 0.1, 0.1)):
+        only = near.copy()
+        only[:, 0] = np.arange(3) == i
+        assert lr.longitudinal_risk(0.0, 15.0, only, 5.0, True, GRADED) == pytest.approx(weight)

@@ -11,11 +11,13 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 import shared_control_env  # noqa: F401
 from shared_control_env.core.authority import LAWS
 from shared_control_env.envs import TwoLaneEnv
+from shared_control_env.envs.cases import TWO_LANE as CASE
+from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.registration import ENVIRONMENTS
-from shared_control_env.vector.environment import two_lane
+from shared_control_env.vector.environment import SharedControlVectorEnv
 from shared_control_env.wrappers import DriverModel
 
-IDS = list(ENVIRONMENTS)
+IDS = ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"]
 TWO_LANE = "SharedControl/TwoLane-v0"
 BIAS = {"onset": 0.2, "ramp": 0.4}
 FAULTS = {
@@ -37,7 +39,7 @@ def flat(info, prefix=""):
 
 
 def assert_same_info(infos, single, index):
-    many = flat(infos)
+    many = flat({key: value for key, value in infos.items() if not key.startswith("final_")})
     one = flat(single)
     assert many.keys() == one.keys()
     for path, value in one.items():
@@ -78,6 +80,74 @@ def test_same_as_the_single_environment(name, fault, law):
     assert compare(single, many, random_driver, seed=len(fault) + len(law)) > 10
 
 
+@pytest.mark.parametrize("degradation", DEGRADATIONS)
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_same_in_every_scenario_under_every_degradation(name, degradation):
+    config = {"degradations": [degradation], "duration": 4.0, "authority": {"law": "proportional"}}
+    single, many = gym.make(name, config=config), gym.make_vec(name, num_envs=2, config=config)
+    gentle = lambda rng, many: (0.03 * rng.normal(size=(many.num_envs, 2))).astype(np.float32)
+    assert compare(single, many, gentle, seed=len(name), index=0) > 10
+
+
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+@pytest.mark.parametrize("name", ["SharedControl/LaneChange-v0", "SharedControl/Bend-v0"])
+def test_same_episodes_are_drawn_one_after_the_other(name, mode):
+    config = {"duration": 0.5}
+    single, many = gym.make(name, config=config), gym.make_vec(name, num_envs=3, config=config, autoreset_mode=mode)
+    kernel = many.unwrapped
+    single.reset(seed=7)
+    many.reset(seed=[5, 6, 7])
+    drawn = set()
+    for _ in range(4):
+        left_out = {"offscreen_rendering"}  # which the single environment settles by its render mode
+        episode = single.unwrapped.episode.model_dump(exclude=left_out)
+        assert kernel.episodes[2].model_dump(exclude=left_out) == episode
+        drawn.add(str(episode))
+        done = False
+        while not done:
+            _, _, terminated, truncated, info = single.step(np.zeros(2))
+            observations, _, terminations, truncations, infos = many.step(np.zeros((3, 2)))
+            done = terminated or truncated
+            assert done == (terminations[2] or truncations[2])
+            if not done:
+                assert_same_info(infos, info, 2)
+        observation, info = single.reset()
+        if mode == "next_step":
+            observations, _, _, _, infos = many.step(np.zeros((3, 2)))
+        np.testing.assert_allclose(observations[2], observation, atol=1e-9)
+        assert_same_info(infos, info, 2)
+    assert len(drawn) == 4
+
+
+def test_a_rollout_of_a_drawn_scenario_draws_every_episode():
+    config = {"duration": 0.5}
+    many = [gym.make_vec("SharedControl/CutIn-v0", num_envs=3, driver=True, config=config) for _ in range(2)]
+    for env in many:
+        env.reset(seed=0)
+    rewards = np.array([many[0].step(None)[1] for _ in range(25)])
+    np.testing.assert_array_equal(many[1].unwrapped.rollout(25).rewards, rewards)
+    assert many[0].unwrapped.episodes == many[1].unwrapped.episodes
+
+
+def test_environments_of_a_drawn_scenario_differ_and_repeat_with_their_seeds():
+    env = gym.make_vec("SharedControl/LaneKeeping-v0", num_envs=4)
+    first = env.reset(seed=[1, 2, 1, None])[0]
+    assert (first[0] == first[2]).all()
+    assert (first[0] != first[1]).any()
+    again = env.reset(seed=[1, 2, 1, None])[0]
+    np.testing.assert_array_equal(first[:3], again[:3])
+
+
+def test_a_drawn_episode_is_shown_as_it_is():
+    env = gym.make_vec("SharedControl/Bend-v0", num_envs=2, render_mode="rgb_array", config={"duration": 0.2})
+    env.reset(seed=0)
+    first = env.render()[0]
+    for _ in range(6):
+        env.step(np.zeros((2, 2)))
+    assert env.render()[0].shape == first.shape
+    assert env.unwrapped._viewer_env.settings.road == env.unwrapped.episodes[0].road
+
+
 @pytest.mark.parametrize("name", IDS)
 def test_same_over_a_full_episode_at_finer_simulation_steps(name):
     config = {"faults": FAULTS["steering"], "simulation_frequency": 60, "longitudinal_risk": {"preset": "paper"}}
@@ -91,7 +161,7 @@ def test_same_where_vehicles_reach_into_the_driving_region():
     config = {"vehicles": vehicles, "faults": FAULTS["steering"], "duration": 5.0}
     single = gym.make(TWO_LANE, config=config)
     many = gym.make_vec(TWO_LANE, num_envs=3, config=config)
-    start = many.unwrapped._setup.traffic
+    start = many.unwrapped._setup.starts.traffic[0]
     start[:, 1] -= (1.2, 1.6, 0.9)
     start[:, 2] += (0.05, -0.1, 0.0)
     place = single.unwrapped._place_vehicles
@@ -319,7 +389,7 @@ def test_refused(call, message):
 )
 def test_wrong_construction(options, message):
     with pytest.raises(ValueError, match=message):
-        two_lane(**options)
+        SharedControlVectorEnv(CASE, **options)
 
 
 def test_stepping_before_a_reset():

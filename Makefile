@@ -4,10 +4,12 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
-.PHONY: help install reproduce test lint types bench figures clean
+.PHONY: help install reproduce reference sensitivity test lint types bench figures clean
 
 help:
 	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
+	@echo "make reference  run the reference benchmark and write its table and report to results/reference"
+	@echo "make sensitivity  vary what the paper leaves open, and write a table and a picture to results/sensitivity"
 	@echo "make test       lint, types and all tests"
 	@echo "make bench      speed, as ratios against highway-env and SciPy in the same run"
 	@echo "make figures    copy the README's pictures from results/paper"
@@ -32,6 +34,12 @@ install: $(VENV)/.experiments
 reproduce: $(VENV)/.experiments
 	$(BIN)/python -m experiments.reproduce $(ARGS)
 
+reference: $(VENV)/.experiments
+	$(BIN)/python -m experiments.benchmark $(ARGS)
+
+sensitivity: $(VENV)/.experiments
+	$(BIN)/python -m experiments.sensitivity $(ARGS)
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -40,7 +48,7 @@ types: $(VENV)/.dev
 	$(BIN)/mypy
 
 test: lint types
-	$(BIN)/python -m pytest -q $(ARGS)
+	$(BIN)/python -m pytest -q -n auto $(ARGS)
 
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks $(ARGS)

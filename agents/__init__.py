@@ -1,1 +1,1 @@
-"""Drivers that plug into :class:`shared_control_env.wrappers.DriverModel`."""
+"""Drivers that are trained; those that follow rules are in :mod:`shared_control_env.controllers.scripted`."""

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import controllers, environments, parts, startup, vectors
+from benchmarks import controllers, environments, parts, startup, suite, vectors
 from benchmarks.timing import Timing
 
 
@@ -45,6 +45,9 @@ def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timi
     report("import and first step, warm caches", f"{whole.median:.2f} s", "", "")
 
     _vectors(report, peer, limited, repeats)
+    seconds = Timing.of(suite.seconds_for(10_000, max(3, repeats // 5)))
+    spread = f"{seconds.median:.0f} s ({seconds.low:.0f} to {seconds.high:.0f})"
+    report("10,000 episodes of 10 s of the full suite, all cores", spread, "", "300 s")
     report("vector env, import to first step, cold", f"{startup.vector_start(cold=True):.1f} s", "", "30 s")
     report("vector env, import to first step, warm", f"{startup.vector_start(cold=False):.2f} s", "", "2 s")
 

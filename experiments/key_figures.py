@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd
 
 from experiments.case_runs import Run, all_runs, simulate
-from experiments.output import write_atomically
+from shared_control_env.evaluation.storage import write_atomically
 
 EXPECTED = Path(__file__).parent / "expected" / "key_figures.json"
 

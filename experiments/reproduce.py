@@ -28,7 +28,7 @@ from experiments import (
     video,
 )
 from experiments.case_runs import CASES, SEED, Run, all_runs, simulate
-from experiments.output import write_atomically
+from shared_control_env.evaluation.storage import write_atomically
 
 ROOT = Path(__file__).parent.parent
 STAMP = "fingerprint.txt"

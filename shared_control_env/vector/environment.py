@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -56,6 +56,9 @@ AUTORESET = {
 
 KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 """Traffic that the kernel knows."""
+
+ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_vehicles_type")
+"""Settings that all environments share."""
 
 FEWEST_PER_THREAD = 64
 """Environments under which another thread costs more than it saves."""
@@ -143,6 +146,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._viewer_env: Any = None
         default = configuration.merge(configuration.plain(configuration.Settings()), case.settings)
         self._settings = configuration.check(configuration.merge(default, config or {}))
+        self._templates = [self._settings] * num_envs
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
         wanted = threads or os.cpu_count() or 1
@@ -183,9 +187,9 @@ class SharedControlVectorEnv(VectorEnv):
             )
         self.metadata["render_fps"] = settings.policy_frequency
         self._path = np.zeros((settings.steps + 1, 2))
-        self._random = is_random(settings)
+        self._random = any(template is not settings or is_random(template) for template in self._templates)
         self._episodes, self._prepared = [settings] * n, [settings] * n
-        starts = _no_starts(n if self._random else 1, settings)
+        starts = _no_starts(n if self._random else 1, self._templates)
         if not self._random:
             _write_start(settings, starts, 0)
         self._setup = Setup(
@@ -218,6 +222,16 @@ class SharedControlVectorEnv(VectorEnv):
         return configuration.plain(self._settings)
 
     @property
+    def scenes(self) -> np.ndarray:
+        """What the sensors of each environment give, records of :data:`records.SCENE`, shape (N,)."""
+        return self._batch.scenes
+
+    @property
+    def signals(self) -> np.ndarray:
+        """Signals planned for the present step of each environment, records of :data:`records.SIGNALS`, shape (N,)."""
+        return self._batch.signals
+
+    @property
     def episodes(self) -> tuple[Settings, ...]:
         """Settings of the present episode of each environment, with all that is random drawn."""
         return tuple(self._episodes)
@@ -244,7 +258,7 @@ class SharedControlVectorEnv(VectorEnv):
         Args:
             seed: of all environments: an int for seed, seed + 1, ..., or one for each.
             options: ``{"reset_mask": mask}`` resets the environments it names alone; ``{"config": {...}}`` changes
-                the settings of all.
+                the settings of all, and a list of N such dicts those of each.
 
         Returns:
             Observations, and infos with masks as Gymnasium's.
@@ -262,9 +276,7 @@ class SharedControlVectorEnv(VectorEnv):
                 raise ValueError(
                     "options['config'] changes all environments; it does not go with a partial 'reset_mask'"
                 )
-            merged = configuration.merge(configuration.plain(self._settings), config)
-            self._settings, self._viewer_env = configuration.check(merged), None
-            self._set_up()
+            self._configure(config)
         self._take_seeds(seed, mask)
         out = self._outputs()
         if self._started:  # Environments that the mask leaves out keep their last observation.
@@ -353,13 +365,36 @@ class SharedControlVectorEnv(VectorEnv):
         if self._pool is not None:
             self._pool.shutdown()
 
+    def _configure(self, config: dict[str, Any] | Sequence[dict[str, Any]]) -> None:
+        """Change the settings of all environments, or those of each by one entry of a list."""
+        base = configuration.plain(self._settings)
+        if isinstance(config, Mapping):
+            self._settings = configuration.check(configuration.merge(base, config))
+            self._templates = [self._settings] * self.num_envs
+        elif len(config) != self.num_envs:
+            raise ValueError(
+                f"options['config'] has {len(config)} entries; it must be a dict or have one for each of "
+                f"{self.num_envs} environments"
+            )
+        else:
+            templates = [configuration.check(configuration.merge(base, entry)) for entry in config]
+            for i, template in enumerate(templates):
+                for name in ONE_FOR_ALL:
+                    if getattr(template, name) != getattr(self._settings, name):
+                        raise ValueError(f"options['config'][{i}][{name!r}] must be that of all environments")
+                if len(template.vehicles) != len(self._settings.vehicles):
+                    raise ValueError(f"options['config'][{i}]['vehicles'] must have as many entries as in all")
+            self._templates = templates
+        self._viewer_env = None
+        self._set_up()
+
     def _prepare(self, mask: np.ndarray) -> None:
         """Draw the next episode of the environments that the mask names."""
         for i in np.flatnonzero(mask).tolist():
             generator = self._generators[i]
             if generator is None:
                 generator = self._generators[i] = seeding.np_random(None)[0]
-            self._prepared[i] = draw_episode(self._settings, generator)
+            self._prepared[i] = draw_episode(self._templates[i], generator)
             _write_start(self._prepared[i], self._setup.starts, i)
 
     def _begin_next(self, mask: np.ndarray) -> None:
@@ -500,14 +535,16 @@ def _batched(records: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
     return values
 
 
-def _no_starts(n: int, settings: Settings) -> Starts:
-    """Arrays for n starts, large enough for whatever the settings draw."""
-    faults = len(settings.faults) + (1 if settings.degradations else 0)
-    vehicles = len(settings.vehicles)
+def _no_starts(n: int, templates: Sequence[Settings]) -> Starts:
+    """Arrays for n starts, large enough for whatever any of the settings draws."""
+    different = list({id(template): template for template in templates}.values())
+    faults = max(len(template.faults) + (1 if template.degradations else 0) for template in different)
+    rows = max(_most_rows(template) for template in different)
+    vehicles = len(different[0].vehicles)
     return Starts(
         parameters=np.zeros(n, record_dtype(Parameters)),
         states=np.zeros((n, 6)),
-        lines=np.zeros((n, _most_rows(settings), 6)),
+        lines=np.zeros((n, rows, 6)),
         faults=np.zeros((n, faults), record_dtype(DegradationParameters)),
         traffic=np.zeros((n, vehicles, 8)),
         plans=np.zeros((n, vehicles), record_dtype(TrafficParameters)),

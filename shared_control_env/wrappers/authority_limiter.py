@@ -1,11 +1,14 @@
-"""The paper's limiter: risk assessment and fuzzy inference decide the automation's authority."""
+"""The limiter of the automation's authority: the paper's fuzzy inference, or any other allocator."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
+from shared_control_env.controllers.allocators import Allocator
 from shared_control_env.core import single
 from shared_control_env.envs.slots import AUTHORITY
 from shared_control_env.wrappers.slots import SlotWrapper
@@ -19,12 +22,29 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
 
     Args:
         env: an environment whose authority is open.
+        allocator: another :class:`Allocator` to decide in the fuzzy inference's place.
+
+    Raises:
+        ValueError: if the allocator lacks ``reset`` or ``allocate``.
     """
 
-    def __init__(self, env: gym.Env) -> None:
-        RecordConstructorArgs.__init__(self)
+    def __init__(self, env: gym.Env, allocator: Allocator | None = None) -> None:
+        RecordConstructorArgs.__init__(self, allocator=allocator)
         SlotWrapper.__init__(self, env, AUTHORITY)
+        if allocator is not None and not isinstance(allocator, Allocator):
+            raise ValueError(f"allocator = {allocator!r} must have reset(seed) and allocate(scene, signals) -> alpha_a")
+        self.allocator = allocator
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Reset environment and allocator; the allocator's seed comes from the environment's generator."""
+        result = self.env.reset(seed=seed, options=options)
+        if self.allocator is not None:
+            (own,) = self.shared.np_random.spawn(1)
+            self.allocator.reset(seed=int(own.integers(2**31)))
+        return result
 
     def decide(self) -> np.ndarray:
         """alpha_a of the planned step, shape (1,)."""
+        if self.allocator is not None:
+            return np.array([self.allocator.allocate(self.shared.scene, self.shared.signals)])
         return np.array([single.fuzzy_authority(self.shared.signals, self.shared.parameters)])

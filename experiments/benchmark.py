@@ -1,0 +1,146 @@
+"""The reference table: every authority with every driver on the full suite, and the finding in words.
+
+``python -m experiments.benchmark`` runs it and writes the table that the README shows.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from shared_control_env.evaluation import AUTHORITIES, DRIVERS, evaluate
+from shared_control_env.evaluation.storage import write_atomically
+
+SHOWN = ("mpc", "scripted", "distracted", "over_reacting", "fighting", "none")
+"""Drivers of the README's table; the report has all of them."""
+
+RESAMPLES = 2000
+"""Of the bootstrap."""
+
+
+def failures_and_error(table: pd.DataFrame) -> pd.DataFrame:
+    """Share of episodes that end in a collision or off the road [%], and mean lateral RMS error [m], in one cell."""
+    groups = table.groupby(["authority", "driver"], sort=False)
+    cells = groups[["terminated", "lateral_rms"]].mean()
+    text = [f"{100.0 * rate:.1f} / {error:.2f}" for rate, error in cells.to_numpy(dtype=float).tolist()]
+    square = pd.Series(text, index=cells.index).unstack("driver")
+    return square.loc[[a for a in AUTHORITIES if a in square.index], [d for d in DRIVERS if d in square.columns]]
+
+
+def difference(
+    table: pd.DataFrame, driver: str, first: str, second: str, metric: str = "terminated"
+) -> tuple[float, float, float]:
+    """Mean of a metric under one authority minus that under another, on the same episodes, and its 95 % interval.
+
+    Pairs of episodes are resampled (percentile bootstrap).
+    """
+    one = table[table["driver"] == driver]
+    keys = ["scenario", "degradation", "seed"]
+    pairs = one[one["authority"] == first].merge(one[one["authority"] == second], on=keys, suffixes=("", "_other"))
+    change = pairs[metric].to_numpy(dtype=float) - pairs[f"{metric}_other"].to_numpy(dtype=float)
+    rng = np.random.default_rng(0)
+    means = change[rng.integers(len(change), size=(RESAMPLES, len(change)))].mean(axis=1)
+    low, high = np.percentile(means, [2.5, 97.5])
+    return float(change.mean()), float(low), float(high)
+
+
+def compared(table: pd.DataFrame, driver: str, first: str, second: str) -> str:
+    """A sentence on the failures under two authorities that says what the interval allows to be said."""
+    change, low, high = (100.0 * value for value in difference(table, driver, first, second))
+    numbers = f"{change:+.1f} percentage points (95 % interval {low:+.1f} to {high:+.1f})"
+    if low <= 0.0 <= high:
+        return (
+            f"with the driver `{driver}`, the failures under `{first}` and `{second}` cannot be told apart: {numbers}"
+        )
+    verdict = "fewer" if high < 0.0 else "more"
+    return f"with the driver `{driver}`, `{first}` has {verdict} failures than `{second}`: {numbers}"
+
+
+def finding(table: pd.DataFrame) -> list[str]:
+    """What the table says, in sentences made from its numbers."""
+    rates = 100.0 * table.groupby(["authority", "driver"])["terminated"].mean()
+    healthy = 100.0 * table[table["degradation"] == "none"].groupby("authority")["terminated"].mean()
+    worst = 100.0 * table[table["authority"] == "none"].groupby("degradation")["terminated"].mean()
+    lines = []
+    for driver in [name for name in SHOWN if name in set(table["driver"])]:
+        of_driver = rates.xs(driver, level="driver").sort_values()
+        lines.append(
+            f"`{driver}`: fewest failures under `{of_driver.index[0]}` ({of_driver.iloc[0]:.1f} %), most under "
+            f"`{of_driver.index[-1]}` ({of_driver.iloc[-1]:.1f} %)"
+        )
+    present = set(table["authority"])
+    for driver, first, second in (
+        ("mpc", "paper", "none"),
+        ("mpc", "paper", "proportional"),
+        ("mpc", "proportional", "none"),
+        ("none", "proportional", "none"),
+        ("distracted", "fixed", "proportional"),
+        ("distracted", "takeover", "proportional"),
+    ):
+        if {first, second} <= present and driver in set(table["driver"]):
+            lines.append(compared(table, driver, first, second))
+    lines.append(
+        f"without a limit the degradation that fails most is `{worst.idxmax()}` ({worst.max():.0f} %); without a "
+        f"fault the failures are between {healthy.min():.1f} % (`{healthy.idxmin()}`) and {healthy.max():.1f} % "
+        f"(`{healthy.idxmax()}`)"
+    )
+    return lines
+
+
+def as_markdown(table: pd.DataFrame) -> str:
+    """Table of the drivers shown, and the finding, in Markdown."""
+    square = failures_and_error(table[table["driver"].isin(SHOWN)])
+    rows = [f"| {name} | " + " | ".join(row) + " |" for name, row in zip(square.index, square.to_numpy(), strict=True)]
+    lines = [
+        f"Failures [%] / mean lateral RMS error [m]; {len(table):,} episodes, seeds {sorted(set(table['seed']))}.",
+        "",
+        "| authority | " + " | ".join(square.columns) + " |",
+        "| --- |" + " --- |" * len(square.columns),
+        *rows,
+        "",
+        *(f"- {line}." for line in finding(table)),
+        "",
+        f"Made with {table['versions'].iloc[0]}.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results/reference"),
+    seeds: Annotated[int, typer.Option(min=1, help="How many.")] = 3,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = os.cpu_count() or 1,
+    fresh: Annotated[bool, typer.Option(help="Replace other results in the folder.")] = False,
+) -> None:
+    """Run every authority with every driver on the full suite; stopped, it goes on where it was."""
+    console = Console()
+    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("episodes", total=None)
+        try:
+            table = evaluate(
+                DRIVERS,
+                AUTHORITIES,
+                "full",
+                seeds=range(seeds),
+                out=out,
+                fresh=fresh,
+                jobs=jobs,
+                progress=lambda done, total: bar.update(task, completed=done, total=total),
+            )
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+    text = as_markdown(table)
+    write_atomically(out / "reference.md", lambda path: path.write_text(text))
+    console.print(text, markup=False)
+    console.print(f"Results are in {out}.")
+
+
+if __name__ == "__main__":
+    typer.run(main)

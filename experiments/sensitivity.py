@@ -1,0 +1,158 @@
+"""How both cases of the paper depend on what the paper leaves open, and on the driver.
+
+``python -m experiments.sensitivity`` varies one parameter at a time and writes a table and a picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import typer
+from rich.console import Console
+from rich.progress import track
+
+from experiments import style
+from shared_control_env.core import fuzzy
+from shared_control_env.core.parameters import (
+    DriverLagParameters,
+    PredictiveParameters,
+    TaskParameters,
+    VehicleParameters,
+)
+from shared_control_env.evaluation import AuthorityEntry, evaluate
+from shared_control_env.evaluation.storage import write_atomically
+
+LAWS = ("paper", "proportional")
+SHOWN = {"two_lane": "lateral_max", "curve": "min_gap"}
+"""Metric of each case's picture; the table has all."""
+
+METRICS = ("lateral_max", "min_gap", "authority_min", "driver_effort", "conflict")
+"""Metrics of the table."""
+
+
+class WarpedFuzzyAuthority:
+    """The fuzzy inference with the inner breakpoints of its inputs moved from (1/4, 1/2, 3/4) to their powers 1/g.
+
+    Args:
+        exponent: g; above 1 the same risk counts as smaller.
+    """
+
+    def __init__(self, exponent: float) -> None:
+        self.exponent = exponent
+
+    def reset(self, seed: int | None = None) -> None:
+        """Nothing is remembered."""
+
+    def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
+        """alpha_a of one step."""
+        r_x, r_y = (float(signals[name]) ** self.exponent for name in ("r_x", "r_y"))
+        return fuzzy.authority(r_x, r_y, 0)
+
+
+class Variation(NamedTuple):
+    """One parameter moved.
+
+    Attributes:
+        parameter: what is varied, with the factor or value.
+        value: factor, or value.
+        config: changes to the settings.
+        exponent: of the risks, where the breakpoints are moved.
+    """
+
+    parameter: str
+    value: float
+    config: Mapping[str, Any]
+    exponent: float = 1.0
+
+
+def variations() -> list[Variation]:
+    """The base, and every parameter below and above it."""
+    vehicle, weights, lag = VehicleParameters(), PredictiveParameters(), DriverLagParameters()
+    found = [Variation("as published", 1.0, {})]
+    for factor in (0.85, 1.2, 1.5):
+        stiffness = {"C_f": vehicle.C_f * factor, "C_r": vehicle.C_r * factor}
+        found.append(Variation("cornering stiffness, factor", factor, {"vehicle": stiffness}))
+    for name in ("W", "H", "N", "Q_a", "Q_delta", "R"):
+        for factor in (0.5, 2.0):
+            changed = {name: getattr(weights, name) * factor}
+            found.append(Variation(f"MPC weight {name}, factor", factor, {"automation": changed, "driver": changed}))
+    for exponent in (0.7, 1.4):
+        found.append(Variation("membership breakpoints, exponent", exponent, {}, exponent))
+    for gain in (0.8, 1.2):
+        found.append(Variation("K_h, value", lag.K_h * gain, {"driver_lag": {"K_h": lag.K_h * gain}}))
+    for constant in (0.1, 0.3):
+        found.append(Variation("T_h, value [s]", constant, {"driver_lag": {"T_h": constant}}))
+    for horizon in (0.6 * TaskParameters().tau_p, 1.0):
+        found.append(Variation("tau_p, value [s]", horizon, {"task": {"tau_p": horizon}}))
+    return found
+
+
+def measure(variation: Variation) -> pd.DataFrame:
+    """Both cases under both laws, one row each."""
+    authorities = {law: AuthorityEntry(law, law, partial(WarpedFuzzyAuthority, variation.exponent)) for law in LAWS}
+    table = evaluate("mpc", authorities, "paper", config=variation.config)
+    return table.assign(parameter=variation.parameter, value=variation.value)[
+        ["parameter", "value", "scenario", "authority", *METRICS, "terminated"]
+    ]
+
+
+def draw(table: pd.DataFrame, path: Path) -> None:
+    """Range of each case's metric over every parameter, about the published setting."""
+    with style.figure(path, 2, 2, (12.0, 9.0)) as (fig, axes):
+        for column, law in enumerate(LAWS):
+            for axis, (case, metric) in zip(axes[:, column], SHOWN.items(), strict=True):
+                base, ranges = deviations(table, case, law)
+                low, high = ranges["low"], ranges["high"]
+                axis.barh(ranges.index, high - low, left=low, color=style.LAW_COLOURS[law])
+                axis.axvline(base, color="black", lw=1)
+                axis.invert_yaxis()
+                margin = max(0.05 * float(high.max() - low.min()), 0.05)
+                axis.set_xlim(float(low.min()) - margin, float(high.max()) + margin)
+                axis.set(title=f"{case}, law {law}", xlabel=f"{metric} [m]")
+        fig.suptitle("Range when one parameter is varied; the line is the setting as published")
+
+
+def deviations(table: pd.DataFrame, case: str, law: str) -> tuple[float, pd.DataFrame]:
+    """A case's metric as published, and its lowest and highest value over the variations of every parameter."""
+    part = table[(table["authority"] == law) & (table["scenario"] == case)].round({SHOWN[case]: 6})
+    published = part["parameter"] == "as published"
+    base = float(part.loc[published, SHOWN[case]].iloc[0])
+    groups = part[~published].groupby("parameter", sort=False)[SHOWN[case]]
+    return base, pd.DataFrame({"low": groups.min().clip(upper=base), "high": groups.max().clip(lower=base)})
+
+
+def as_markdown(table: pd.DataFrame) -> str:
+    """The table in Markdown."""
+    head = "| " + " | ".join(table.columns) + " |\n|" + " --- |" * len(table.columns) + "\n"
+    rows = [
+        "| " + " | ".join(f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in row) + " |"
+        for row in table.itertuples(index=False)
+    ]
+    return head + "\n".join(rows) + "\n"
+
+
+def main(out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results/sensitivity")) -> None:
+    """Vary every parameter; writes sensitivity.csv, sensitivity.md and sensitivity.png."""
+    console = Console()
+    parts = [measure(variation) for variation in track(variations(), "variations", console=console)]
+    table = pd.concat(parts, ignore_index=True)
+    write_atomically(out / "sensitivity.csv", partial(table.to_csv, index=False))
+    write_atomically(out / "sensitivity.md", lambda path: path.write_text(as_markdown(table)))
+    write_atomically(out / "sensitivity.png", partial(draw, table))
+    for law in LAWS:
+        for case, metric in SHOWN.items():
+            base, ranges = deviations(table, case, law)
+            width = ranges["high"] - ranges["low"]
+            console.print(
+                f"{case}, law {law}: {metric} = {base:.3g} m; most sensitive to {width.idxmax()} ({width.max():.2g} m)"
+            )
+    console.print(f"Results are in {out}.")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,25 @@
+"""The benchmark: drivers and authorities on suites of degraded automation, measured and reported."""
+
+from shared_control_env.evaluation.catalogue import (
+    AUTHORITIES,
+    DRIVERS,
+    SUITES,
+    AuthorityEntry,
+    DriverEntry,
+    Suite,
+)
+from shared_control_env.evaluation.metrics import METRICS, Metric, Trajectory
+from shared_control_env.evaluation.runner import evaluate
+
+__all__ = [
+    "AUTHORITIES",
+    "DRIVERS",
+    "METRICS",
+    "SUITES",
+    "AuthorityEntry",
+    "DriverEntry",
+    "Metric",
+    "Suite",
+    "Trajectory",
+    "evaluate",
+]

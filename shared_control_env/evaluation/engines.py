@@ -1,0 +1,74 @@
+"""Ways to run batches: one after the other, in processes, or on a Ray cluster. All give the same rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import Any
+
+from shared_control_env.evaluation.episodes import Batch, run
+
+Rows = list[dict[str, Any]]
+
+ATTEMPTS = 3
+"""Times that Ray starts a batch again whose worker was lost."""
+
+
+def serial(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Rows]]:
+    """One batch after the other, here."""
+    for batch in batches:
+        yield batch, run(batch)
+
+
+def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows]]:
+    """Batches in some processes, as they are done.
+
+    The first batch of either kind, with the driver in the kernel and without, runs here, so that what it compiles is
+    in the cache before the processes look for it.
+
+    Raises:
+        concurrent.futures.process.BrokenProcessPool: if a process was killed.
+    """
+    first: dict[bool, Batch] = {}
+    for batch in batches:
+        first.setdefault(batch.driver[1].make is None, batch)
+    yield from serial(list(first.values()))
+    rest = [batch for batch in batches if batch not in first.values()]
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        futures = {pool.submit(run, batch): batch for batch in rest}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def ray_cluster(batches: Sequence[Batch], jobs: int, address: str | None = None) -> Iterator[tuple[Batch, Rows]]:
+    """Batches as tasks of a Ray cluster, as they are done; one whose worker is lost is started again.
+
+    Args:
+        batches: to run.
+        jobs: cores of a cluster that is started here, where there is none.
+        address: of a running cluster; ``auto`` finds one on this machine.
+
+    Raises:
+        ImportError: without Ray.
+    """
+    try:
+        import ray
+    except ImportError:
+        raise ImportError('the engine ray needs Ray: pip install "shared_control_env[ray]"') from None
+    started = not ray.is_initialized()
+    if started:
+        ray.init(address=address, num_cpus=None if address else jobs, include_dashboard=False, log_to_driver=False)
+    remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS)(run)
+    waiting = {remote.remote(batch): batch for batch in batches}
+    try:
+        while waiting:
+            done, _ = ray.wait(list(waiting))
+            for reference in done:
+                yield waiting.pop(reference), ray.get(reference)
+    finally:
+        if started:
+            ray.shutdown()

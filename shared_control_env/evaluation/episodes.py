@@ -1,0 +1,272 @@
+"""Episodes of the benchmark: which there are, and their run in one vectorised environment a batch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
+from pathlib import Path
+from platform import python_version
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import shared_control_env
+from shared_control_env.controllers.allocators import Allocator
+from shared_control_env.controllers.driver import Driver
+from shared_control_env.core.longitudinal_risk import PRECEDING
+from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
+from shared_control_env.envs.cases import CASES
+from shared_control_env.envs.situation import TRAFFIC_BODY
+from shared_control_env.envs.slots import AUTHORITY, DRIVER
+from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
+from shared_control_env.evaluation.metrics import Trajectory, measure_all
+from shared_control_env.vector.environment import SharedControlVectorEnv
+
+LARGEST_BATCH = 170
+"""Episodes that run together at most: large enough for the kernel, small enough to lose little when stopped."""
+
+NOT_IN_THE_NUMBERS = ("report.py", "replay.py", "statistics.py", "storage.py", "graphics.py")
+"""Sources that no result depends on."""
+
+AS_GIVEN = "own"
+"""Name of the degradation that a scenario has by itself."""
+
+
+class Batch(NamedTuple):
+    """Episodes that differ in degradation and seed alone.
+
+    Attributes:
+        scenario: key of :data:`envs.cases.CASES`.
+        driver: name, and entry.
+        authority: name, and entry.
+        episodes: degradation (None for the scenario's own) and seed of each.
+        config: changes to the scenario's settings.
+    """
+
+    scenario: str
+    driver: tuple[str, DriverEntry]
+    authority: tuple[str, AuthorityEntry]
+    episodes: tuple[tuple[str | None, int], ...]
+    config: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Name for files, which says what is in it."""
+        digest = sha256(repr((self.episodes, json.dumps(self.config, sort_keys=True))).encode()).hexdigest()[:8]
+        return f"{self.scenario}-{self.driver[0]}-{self.authority[0]}-{digest}"
+
+
+def plan(
+    suite: Suite,
+    drivers: Mapping[str, DriverEntry],
+    authorities: Mapping[str, AuthorityEntry],
+    seeds: Sequence[int],
+    config: Mapping[str, Any],
+) -> Iterator[Batch]:
+    """All episodes of a suite in batches, in a fixed order."""
+    episodes = [(degradation, seed) for degradation in suite.degradations for seed in seeds]
+    for scenario in suite.scenarios:
+        for driver in drivers.items():
+            for authority in authorities.items():
+                for i in range(0, len(episodes), LARGEST_BATCH):
+                    yield Batch(scenario, driver, authority, tuple(episodes[i : i + LARGEST_BATCH]), config)
+
+
+def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
+    """Changes to the scenario's settings for one episode of a batch."""
+    config: dict[str, Any] = {"authority": {"law": batch.authority[1].law}}
+    for changes in (batch.driver[1].config, batch.config):
+        config = _joined(config, changes)
+    if degradation is not None:
+        config["degradations"] = [degradation]
+    return config
+
+
+def _joined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
+    """Two nested dicts of changes as one; the second counts where both say something."""
+    joined = dict(first)
+    for key, value in second.items():
+        both = isinstance(value, Mapping) and isinstance(joined.get(key), Mapping)
+        joined[key] = _joined(joined[key], value) if both else value
+    return joined
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the sources that the numbers come from, so that those of a changed checkout are told apart."""
+    digest = sha256()
+    for folder in ("core", "controllers", "envs", "vector", "evaluation"):
+        for path in sorted((Path(shared_control_env.__file__).parent / folder).glob("*.py")):
+            if path.name not in NOT_IN_THE_NUMBERS:
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def versions() -> str:
+    """Versions that enter the results."""
+    packages = ("shared_control_env", "gymnasium", "highway-env", "numpy", "numba", "osqp")
+    parts = [f"{name} {version(name)}" for name in packages]
+    return ", ".join(["python " + python_version(), *parts, f"sources {source_digest()}"])
+
+
+def make_environment(batch: Batch) -> SharedControlVectorEnv:
+    """Environment of a batch's episodes, what the kernel can decide bound."""
+    return SharedControlVectorEnv(
+        CASES[batch.scenario],
+        len(batch.episodes),
+        config=settings_of(batch, None),
+        limiter=batch.authority[1].make is None,
+        driver=batch.driver[1].make is None,
+        threads=1,
+    )
+
+
+class Recorder:
+    """Signals of all time steps of a batch.
+
+    Args:
+        steps: T.
+        n: episodes.
+    """
+
+    SIGNALS = ("z", "y_target", "v_target", "u", "u_h_act", "u_a_act", "alpha_a", "neighbours", "fault_active")
+
+    def __init__(self, steps: int, n: int) -> None:
+        self._values: dict[str, np.ndarray] = {}
+        self._shape = (steps, n)
+        self.lengths = np.full(n, steps)
+        self.crashed, self.left_road = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        self.failures = np.zeros(n, dtype=int)
+        self._running = np.ones(n, dtype=bool)
+
+    def note(self, k: int, infos: Mapping[str, Any], ended: np.ndarray) -> bool:
+        """Keep the signals of step k, and how episodes end with it; whether any goes on."""
+        for name in self.SIGNALS:
+            value = np.asarray(infos[name])
+            if name not in self._values:
+                self._values[name] = np.zeros((*self._shape, *value.shape[1:]), value.dtype)
+            self._values[name][k] = value
+        failures = infos["automation"]["failures"] + (infos["driver"]["failures"] if "driver" in infos else 0)
+        self.failures[self._running] = failures[self._running]
+        over = self._running & ended
+        self.lengths[over] = k + 1
+        self.crashed[over], self.left_road[over] = infos["crashed"][over], ~infos["on_road"][over]
+        self._running &= ~ended
+        return bool(self._running.any())
+
+    def trajectory(self, i: int, settings: Any, wall_time: float) -> Trajectory:
+        """Episode i."""
+        value = {name: array[: self.lengths[i], i] for name, array in self._values.items()}
+        limits = np.array([settings.limits.a_max, settings.limits.delta_max])
+        ahead = value["neighbours"][:, PRECEDING]
+        gap = ahead[:, NEAR_S] - value["z"][:, 0] - 0.5 * (settings.vehicle.length + TRAFFIC_BODY[0])
+        present = ahead[:, PRESENT] > 0.0
+        return Trajectory(
+            dt=1.0 / settings.policy_frequency,
+            lateral_error=value["z"][:, 1] - value["y_target"],
+            lane_width=settings.road.lane_width,
+            speed=value["z"][:, 3],
+            target_speed=value["v_target"],
+            yaw_rate=value["z"][:, 5],
+            command=value["u"] / limits,
+            delta_max=settings.limits.delta_max,
+            a_max=settings.limits.a_max,
+            gap=np.where(present, gap, np.inf),
+            lead_speed=np.where(present, ahead[:, NEAR_SPEED], 0.0),
+            driver=value["u_h_act"] / limits,
+            automation=value["u_a_act"] / limits,
+            authority=value["alpha_a"],
+            degraded=value["fault_active"],
+            crashed=bool(self.crashed[i]),
+            left_road=bool(self.left_road[i]),
+            solver_failures=int(self.failures[i]),
+            wall_time=wall_time,
+        )
+
+
+def _records(array: np.ndarray) -> list[np.ndarray]:
+    """Views of an array's records, each an array of no dimension."""
+    return [array[i : i + 1].reshape(()) for i in range(len(array))]
+
+
+class Policies:
+    """Drivers and allocators of a batch that Python runs, one of each an environment.
+
+    Args:
+        batch: the episodes.
+        env: their environment, reset.
+    """
+
+    def __init__(self, batch: Batch, env: SharedControlVectorEnv) -> None:
+        self._scenes, self._signals = _records(env.scenes), _records(env.signals)
+        limits = env.config["limits"]
+        self._limits = np.array([limits["a_max"], limits["delta_max"]])
+        make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
+        self._drivers: list[Driver] = [make_driver() for _ in batch.episodes] if make_driver else []
+        self._allocators: list[Allocator] = [make_allocator() for _ in batch.episodes] if make_allocator else []
+        for (_, seed), *policies in zip(
+            batch.episodes, *(each for each in (self._drivers, self._allocators) if each), strict=True
+        ):
+            for policy in policies:
+                policy.reset(seed=seed)
+
+    def decide(self, observations: np.ndarray) -> Any:
+        """Action of all environments: of the slots that the kernel leaves open."""
+        action = {}
+        if self._drivers:
+            commands = [d.act(o, s) for d, o, s in zip(self._drivers, observations, self._scenes, strict=True)]
+            action[DRIVER] = np.array(commands) / self._limits
+        if self._allocators:
+            alphas = [
+                a.allocate(scene, signals)
+                for a, scene, signals in zip(self._allocators, self._scenes, self._signals, strict=True)
+            ]
+            action[AUTHORITY] = np.array(alphas, dtype=float)[:, None]
+        return action if len(action) != 1 else next(iter(action.values()))
+
+
+def run(batch: Batch) -> list[dict[str, Any]]:
+    """Run a batch.
+
+    Returns:
+        One row an episode: what it is, how it ended, every metric, and what it was made with.
+    """
+    begin = perf_counter()
+    env = make_environment(batch)
+    seeds = [seed for _, seed in batch.episodes]
+    configs = [settings_of(batch, degradation) for degradation, _ in batch.episodes]
+    observations, _ = env.reset(seed=seeds, options={"config": configs})
+    settings, drawn = env.episodes[0], env.episodes
+    recorder, policies = Recorder(settings.steps, len(batch.episodes)), Policies(batch, env)
+    for k in range(settings.steps):
+        observations, _, terminations, truncations, infos = env.step(policies.decide(observations))
+        if not recorder.note(k, infos, terminations | truncations):
+            break
+    env.close()
+    wall_time = (perf_counter() - begin) / len(batch.episodes)
+    made_with = versions()
+    return [
+        {
+            "scenario": batch.scenario,
+            "degradation": degradation or AS_GIVEN,
+            "driver": batch.driver[0],
+            "authority": batch.authority[0],
+            "seed": seed,
+            "terminated": bool(recorder.crashed[i] or recorder.left_road[i]),
+            "duration": recorder.lengths[i] / settings.policy_frequency,
+            **measure_all(recorder.trajectory(i, drawn[i], wall_time)),
+            "config_hash": config_hash(batch.scenario, configs[i]),
+            "version": version("shared_control_env"),
+            "versions": made_with,
+        }
+        for i, (degradation, seed) in enumerate(batch.episodes)
+    ]
+
+
+def config_hash(scenario: str, changes: Mapping[str, Any]) -> str:
+    """Digest of all that a scenario's settings and the changes to them say."""
+    return sha256(json.dumps([CASES[scenario].settings, changes], sort_keys=True).encode()).hexdigest()[:12]

@@ -1,0 +1,319 @@
+"""What is measured of an episode: every metric with its unit, direction and definition."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+LATERAL_ACCELERATION_LIMIT = 3.0
+"""Largest lateral acceleration of a lane keeping system [m/s^2]; ISO 11270."""
+
+LATERAL_JERK_LIMIT = 5.0
+"""Largest lateral jerk, averaged over half a second [m/s^3]; ISO 11270."""
+
+JERK_WINDOW = 0.5
+"""Over which jerk is averaged [s]; ISO 11270."""
+
+REVERSAL_GAP = np.radians(0.2)
+"""Smallest change of the front steering angle that counts as a reversal [rad]: 3 degrees at the wheel, ratio 16."""
+
+DETECTION_LEVEL = 0.8
+"""Authority under which a degradation counts as detected [-]."""
+
+RECOVERED = 0.5
+"""Lateral error within which the car has recovered [m]."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Signals of one episode at its T time steps, and how it ended.
+
+    Attributes:
+        dt: time step [s].
+        lateral_error: y - y_target, shape (T,) [m].
+        lane_width: [m].
+        speed, target_speed: shape (T,) [m/s].
+        yaw_rate: shape (T,) [rad/s].
+        command: u of the vehicle, ``[a, delta]`` over its limits, shape (T, 2) [-].
+        delta_max: limit of the steering [rad].
+        a_max: limit of the acceleration [m/s^2].
+        gap: bumper to bumper to the vehicle ahead in the lane, inf where there is none, shape (T,) [m].
+        lead_speed: of that vehicle, shape (T,) [m/s].
+        driver, automation: actual commands u_h,act and u_a,act over their limits, shape (T, 2) [-].
+        authority: alpha_a, shape (T,) [-].
+        degraded: whether a degradation is there, shape (T,).
+        crashed, left_road: how the episode ended.
+        solver_failures: steps at which a command was held because a solver failed, of automation and driver.
+        wall_time: computing time [s].
+    """
+
+    dt: float
+    lateral_error: np.ndarray
+    lane_width: float
+    speed: np.ndarray
+    target_speed: np.ndarray
+    yaw_rate: np.ndarray
+    command: np.ndarray
+    delta_max: float
+    a_max: float
+    gap: np.ndarray
+    lead_speed: np.ndarray
+    driver: np.ndarray
+    automation: np.ndarray
+    authority: np.ndarray
+    degraded: np.ndarray
+    crashed: bool
+    left_road: bool
+    solver_failures: int
+    wall_time: float
+
+    @property
+    def onset(self) -> int | None:
+        """First time step with a degradation, None without any."""
+        return int(np.argmax(self.degraded)) if self.degraded.any() else None
+
+
+class Metric(NamedTuple):
+    """A metric.
+
+    Attributes:
+        unit: of its value.
+        better: ``lower``, ``higher`` or ``neither``.
+        definition: in a sentence.
+        measure: its function; nan where it is not defined for the episode.
+    """
+
+    unit: str
+    better: str
+    definition: str
+    measure: Callable[[Trajectory], float]
+
+
+METRICS: dict[str, Metric] = {}
+"""All metrics by name, in the order of the tables."""
+
+
+def metric(unit: str, better: str) -> Callable[[Callable[[Trajectory], float]], Callable[[Trajectory], float]]:
+    """Enter a function into :data:`METRICS` under its name, its docstring as the definition."""
+
+    def enter(measure: Callable[[Trajectory], float]) -> Callable[[Trajectory], float]:
+        METRICS[measure.__name__] = Metric(unit, better, " ".join((measure.__doc__ or "").split()), measure)
+        return measure
+
+    return enter
+
+
+def measure_all(trajectory: Trajectory) -> dict[str, float]:
+    """Every metric of an episode."""
+    return {name: float(entry.measure(trajectory)) for name, entry in METRICS.items()}
+
+
+def _out_of_lane(t: Trajectory) -> np.ndarray:
+    return np.abs(t.lateral_error) > 0.5 * t.lane_width
+
+
+@metric("-", "lower")
+def collisions(t: Trajectory) -> float:
+    """1 if the episode ended in a collision, else 0."""
+    return float(t.crashed)
+
+
+@metric("-", "lower")
+def road_departures(t: Trajectory) -> float:
+    """1 if the episode ended off the road, else 0."""
+    return float(t.left_road)
+
+
+@metric("-", "lower")
+def lane_departures(t: Trajectory) -> float:
+    """Times that the centre of mass leaves the lane to keep: |y - y_target| rises over half a lane width."""
+    out = _out_of_lane(t)
+    return float(np.count_nonzero(out[1:] & ~out[:-1]) + out[0])
+
+
+@metric("s", "lower")
+def time_out_of_lane(t: Trajectory) -> float:
+    """Time with the centre of mass outside the lane to keep."""
+    return float(_out_of_lane(t).sum() * t.dt)
+
+
+@metric("m", "lower")
+def lateral_max(t: Trajectory) -> float:
+    """Largest |y - y_target|."""
+    return float(np.abs(t.lateral_error).max())
+
+
+@metric("m", "lower")
+def lateral_rms(t: Trajectory) -> float:
+    """Root mean square of y - y_target."""
+    return float(np.sqrt(np.mean(t.lateral_error**2)))
+
+
+@metric("m", "higher")
+def min_gap(t: Trajectory) -> float:
+    """Smallest gap to the vehicle ahead in the lane, bumper to bumper; not defined without one."""
+    return float(t.gap.min()) if np.isfinite(t.gap).any() else np.nan
+
+
+@metric("s", "higher")
+def min_thw(t: Trajectory) -> float:
+    """Smallest time headway: the gap to the vehicle ahead over the own speed, while moving faster than 1 m/s."""
+    following = np.isfinite(t.gap) & (t.speed > 1.0)
+    return float((t.gap[following] / t.speed[following]).min()) if following.any() else np.nan
+
+
+def _closing(t: Trajectory) -> np.ndarray:
+    """Steps at which the gap to a vehicle ahead shrinks by more than 0.1 m/s."""
+    return np.isfinite(t.gap) & (t.speed - t.lead_speed > 0.1)
+
+
+@metric("s", "higher")
+def min_ttc(t: Trajectory) -> float:
+    """Smallest time to collision: the gap over the closing speed, while that is above 0.1 m/s."""
+    closing = _closing(t)
+    if not closing.any():
+        return np.nan
+    return float((np.maximum(t.gap, 0.0)[closing] / (t.speed - t.lead_speed)[closing]).min())
+
+
+@metric("m/s^2", "lower")
+def max_drac(t: Trajectory) -> float:
+    """Largest deceleration rate to avoid a crash, closing speed squared over twice the gap; 0 if it never closes."""
+    closing = _closing(t)
+    if not closing.any():
+        return 0.0
+    rate = (t.speed - t.lead_speed)[closing] ** 2 / (2.0 * np.maximum(t.gap[closing], 0.1))
+    return float(rate.max())
+
+
+@metric("s", "lower")
+def time_to_detect(t: Trajectory) -> float:
+    """Time from the onset until alpha_a first lies under 0.8; not defined without an onset or where it never does."""
+    if t.onset is None:
+        return np.nan
+    low = t.authority[t.onset :] < DETECTION_LEVEL
+    return float(np.argmax(low) * t.dt) if low.any() else np.nan
+
+
+@metric("-", "lower")
+def missed_detection(t: Trajectory) -> float:
+    """1 if alpha_a never lies under 0.8 from the onset on, else 0; not defined without an onset."""
+    return float(not (t.authority[t.onset :] < DETECTION_LEVEL).any()) if t.onset is not None else np.nan
+
+
+@metric("-", "lower")
+def false_authority_loss(t: Trajectory) -> float:
+    """Mean of 1 - alpha_a before the onset, or over the whole episode without one."""
+    healthy = t.authority[: t.onset]
+    return float(np.mean(1.0 - healthy)) if len(healthy) else np.nan
+
+
+@metric("-", "neither")
+def authority_min(t: Trajectory) -> float:
+    """Smallest alpha_a."""
+    return float(t.authority.min())
+
+
+@metric("-", "lower")
+def driver_effort(t: Trajectory) -> float:
+    """Root mean square of the driver's actual command u_h,act, both channels over their limits."""
+    return float(np.sqrt(np.mean(np.sum(t.driver**2, axis=1))))
+
+
+@metric("-", "lower")
+def driver_effort_peak(t: Trajectory) -> float:
+    """Largest magnitude of the driver's actual command u_h,act, both channels over their limits."""
+    return float(np.sqrt(np.sum(t.driver**2, axis=1).max()))
+
+
+@metric("-", "lower")
+def conflict(t: Trajectory) -> float:
+    """Mean of max(0, -u_h,act u_a,act) over both channels, over their limits: driver against automation."""
+    return float(np.mean(np.maximum(0.0, -t.driver * t.automation).sum(axis=1)))
+
+
+@metric("1/min", "lower")
+def steering_reversal_rate(t: Trajectory) -> float:
+    """Reversals of the front steering angle by more than 0.2 degrees a minute (Markkula & Engstrom 2006, no filter)."""
+    steering = t.command[:, 1] * t.delta_max
+    reversals, direction, extreme = 0, 0, steering[0]
+    for angle in steering.tolist():
+        if direction >= 0 and angle < extreme - REVERSAL_GAP:
+            reversals += direction > 0
+            direction, extreme = -1, angle
+        elif direction <= 0 and angle > extreme + REVERSAL_GAP:
+            reversals += direction < 0
+            direction, extreme = 1, angle
+        elif direction * (angle - extreme) > 0.0:
+            extreme = angle
+    return 60.0 * reversals / (len(steering) * t.dt)
+
+
+@metric("m/s^2", "lower")
+def lateral_acceleration_max(t: Trajectory) -> float:
+    """Largest |v_x r|; ISO 11270 allows 3 m/s^2."""
+    return float(np.abs(t.speed * t.yaw_rate).max())
+
+
+def _lateral_jerk(t: Trajectory) -> np.ndarray:
+    """Change of v_x r over half a second, divided by it, magnitudes [m/s^3]."""
+    n = max(1, round(JERK_WINDOW / t.dt))
+    lateral = t.speed * t.yaw_rate
+    return np.abs(lateral[n:] - lateral[:-n]) / (n * t.dt)
+
+
+@metric("m/s^3", "lower")
+def lateral_jerk_max(t: Trajectory) -> float:
+    """Largest lateral jerk, averaged over 0.5 s; ISO 11270 allows 5 m/s^3; not defined for shorter episodes."""
+    jerk = _lateral_jerk(t)
+    return float(jerk.max()) if len(jerk) else np.nan
+
+
+@metric("-", "lower")
+def iso_11270_violation(t: Trajectory) -> float:
+    """Share of the time with a lateral acceleration over 3 m/s^2 or a lateral jerk, over 0.5 s, over 5 m/s^3."""
+    beyond = np.abs(t.speed * t.yaw_rate) > LATERAL_ACCELERATION_LIMIT
+    jerk = _lateral_jerk(t) > LATERAL_JERK_LIMIT
+    beyond[len(beyond) - len(jerk) :] |= jerk
+    return float(beyond.mean())
+
+
+@metric("m/s^3", "lower")
+def jerk_rms(t: Trajectory) -> float:
+    """Root mean square of the change of the acceleration command over the time step."""
+    if len(t.command) < 2:
+        return np.nan
+    return float(np.sqrt(np.mean((np.diff(t.command[:, 0]) * t.a_max / t.dt) ** 2)))
+
+
+@metric("m/s", "lower")
+def speed_rms(t: Trajectory) -> float:
+    """Root mean square of v_x minus the target speed."""
+    return float(np.sqrt(np.mean((t.speed - t.target_speed) ** 2)))
+
+
+@metric("s", "lower")
+def recovery_time(t: Trajectory) -> float:
+    """Time from the onset until |y - y_target| stays within 0.5 m to the end; not defined where it does not."""
+    if t.onset is None or t.crashed or t.left_road:
+        return np.nan
+    outside = np.flatnonzero(np.abs(t.lateral_error[t.onset :]) > RECOVERED)
+    if len(outside) == 0:
+        return 0.0
+    recovered = outside[-1] + 1
+    return float(recovered * t.dt) if t.onset + recovered < len(t.lateral_error) else np.nan
+
+
+@metric("-", "lower")
+def solver_failures(t: Trajectory) -> float:
+    """Steps at which a solver failed and the last command was held, of automation and driver."""
+    return float(t.solver_failures)
+
+
+@metric("-", "higher")
+def real_time_factor(t: Trajectory) -> float:
+    """Simulated time over computing time, of the batch that the episode ran in; it differs from run to run."""
+    return len(t.lateral_error) * t.dt / t.wall_time

@@ -29,6 +29,6 @@ def test_parts_and_vectors_run():
     assert all(timing.median > 0.0 for timing in parts.times(1).values())
     assert vectors.kernel(64, 1, False, 1).median > 0.0
     assert vectors.kernel(64, 2, True, 1).median > 0.0
-    (seconds,) = suite.seconds_for(10, 1)
+    (seconds,) = suite.seconds_for(10, 1, "paper")
     assert seconds > 0.0
     assert 0 < vectors.bytes_per_environment() <= 4096

@@ -234,3 +234,36 @@ def test_list_and_replay(tmp_path):
     assert video.stat().st_size > 10_000
     refused = command(*arguments, "--video", video)
     assert "exists already" in " ".join(refused.communicate(timeout=60)[0].split())
+
+
+def test_a_full_disk_is_said_and_what_was_done_is_kept(tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    from shared_control_env.cli import app
+
+    real = ResultsFolder.add
+
+    def add_until_full(folder, name, rows):
+        if len(list(tmp_path.rglob("*.parquet"))) == 1:
+            raise OSError(28, "No space left on device")
+        real(folder, name, rows)
+
+    arguments = [
+        "benchmark",
+        "--drivers",
+        "none",
+        "--authorities",
+        "fixed,none",
+        "--seeds",
+        "0",
+        "--out",
+        str(tmp_path),
+    ]
+    monkeypatch.setattr(ResultsFolder, "add", add_until_full)
+    full = CliRunner().invoke(app, arguments)
+    assert full.exit_code == 1
+    assert "No space left on device" in full.output
+    assert len(pd.concat([pd.read_parquet(path) for path in tmp_path.rglob("*.parquet")])) == 1
+    monkeypatch.setattr(ResultsFolder, "add", real)
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert len(pd.read_parquet(tmp_path / "episodes.parquet")) == 4

@@ -12,11 +12,10 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from shared_control_env.evaluation import AUTHORITIES, DRIVERS, evaluate
-from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.cli import benchmark as run_suite
+from shared_control_env.evaluation import AUTHORITIES, DRIVERS
+from shared_control_env.evaluation.storage import TABLE, write_atomically
 
 SHOWN = ("mpc", "scripted", "distracted", "over_reacting", "fighting", "none")
 """Drivers of the README's table; the report has all of them."""
@@ -119,27 +118,11 @@ def main(
     fresh: Annotated[bool, typer.Option(help="Replace other results in the folder.")] = False,
 ) -> None:
     """Run every authority with every driver on the full suite; stopped, it goes on where it was."""
-    console = Console()
-    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task("episodes", total=None)
-        try:
-            table = evaluate(
-                DRIVERS,
-                AUTHORITIES,
-                "full",
-                seeds=range(seeds),
-                out=out,
-                fresh=fresh,
-                jobs=jobs,
-                progress=lambda done, total: bar.update(task, completed=done, total=total),
-            )
-        except ValueError as error:
-            raise typer.BadParameter(str(error)) from None
+    run_suite("full", "all", "all", f"0-{seeds - 1}", jobs, out=out, fresh=fresh)
+    table = pd.read_parquet(out / TABLE)
     text = as_markdown(table)
     write_atomically(out / "reference.md", lambda path: path.write_text(text))
-    console.print(text, markup=False)
-    console.print(f"Results are in {out}.")
+    typer.echo(text)
 
 
 if __name__ == "__main__":

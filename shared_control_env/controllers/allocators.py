@@ -7,11 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from shared_control_env.core.longitudinal_risk import PRECEDING
-from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
-
-VEHICLE_LENGTH = 5.0
-"""Length taken off the distance of the centres [m]; highway-env's vehicles."""
+from shared_control_env.controllers.lead import lead_of
 
 
 @runtime_checkable
@@ -151,11 +147,9 @@ class TimeBasedAuthority:
 
     def time_to_collision(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """Time to collision with the vehicle ahead at the predicted speed [s]; infinite unless closing."""
-        near = scene["neighbours"][PRECEDING].tolist()
-        closing = float(signals["prediction"][3]) - near[NEAR_SPEED]
-        if not near[PRESENT] or closing <= 0.0:
-            return inf
-        return max(near[NEAR_S] - float(scene["z"][0]) - VEHICLE_LENGTH, 0.0) / closing
+        gap, v_lead = lead_of(scene)
+        closing = float(signals["prediction"][3]) - v_lead
+        return max(gap, 0.0) / closing if closing > 0.0 else inf
 
     def time_to_lane_crossing(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """Time until the centre is on the lane's edge at the predicted lateral speed [s]."""

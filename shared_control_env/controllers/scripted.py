@@ -6,12 +6,8 @@ from math import atan2, exp, inf
 
 import numpy as np
 
-from shared_control_env.core.longitudinal_risk import PRECEDING
-from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
+from shared_control_env.controllers.lead import lead_of
 from shared_control_env.core.traffic import idm_acceleration
-
-VEHICLE_LENGTH = 5.0
-"""Length taken off the distance of the centres [m]; highway-env's vehicles."""
 
 
 class ScriptedDriver:
@@ -43,10 +39,9 @@ class ScriptedDriver:
         error = y - float(scene["y_target"])
         steering = self.wheelbase * float(scene["kappa"][0]) - psi - atan2(self.gain * error, v + self.softening)
         acceleration = self.speed_gain * (float(scene["v_target"]) - v)
-        near = scene["neighbours"][PRECEDING].tolist()
-        if near[PRESENT]:
-            gap = near[NEAR_S] - float(scene["z"][0]) - VEHICLE_LENGTH
-            acceleration = min(acceleration, idm_acceleration(max(v, 0.0), inf, gap, near[NEAR_SPEED]))
+        gap, v_lead = lead_of(scene)
+        if gap < inf:
+            acceleration = min(acceleration, idm_acceleration(max(v, 0.0), inf, gap, v_lead))
         return np.array([acceleration, steering])
 
 

@@ -70,8 +70,9 @@ def finding(table: pd.DataFrame) -> list[str]:
     lines = []
     for driver in [name for name in SHOWN if name in set(table["driver"])]:
         of_driver = rates.xs(driver, level="driver").sort_values()
+        fewest = ", ".join(f"`{name}`" for name in of_driver.index[of_driver == of_driver.iloc[0]])
         lines.append(
-            f"`{driver}`: fewest failures under `{of_driver.index[0]}` ({of_driver.iloc[0]:.1f} %), most under "
+            f"`{driver}`: fewest failures under {fewest} ({of_driver.iloc[0]:.1f} %), most under "
             f"`{of_driver.index[-1]}` ({of_driver.iloc[-1]:.1f} %)"
         )
     present = set(table["authority"])

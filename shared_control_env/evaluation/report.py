@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import io
+import re
+import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -14,10 +16,13 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
-from shared_control_env.evaluation.metrics import Metric
 from shared_control_env.evaluation.statistics import STATISTICS, Interval, intervals
 from shared_control_env.evaluation.storage import write_atomically
+
+if TYPE_CHECKING:
+    from shared_control_env.evaluation.metrics import Metric
 
 SHOWN = ("lateral_rms", "driver_effort", "conflict", "false_authority_loss")
 """Metrics of the plots, as far as the table has them."""
@@ -25,8 +30,26 @@ SHOWN = ("lateral_rms", "driver_effort", "conflict", "false_authority_loss")
 GALLERY = 20
 """Failures shown."""
 
-COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#bbbbbb", "#000000")
-"""Tol's bright palette, told apart by the colour-blind."""
+INK = "#010203"
+"""Stands for the page's text colour, which depends on the reader's light or dark scheme."""
+
+COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", INK)
+"""Tol's bright palette, told apart by the colour-blind; its grey is darker here, to be seen on white."""
+
+STYLE: dict[Any, Any] = {
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+    "text.parse_math": False,  # a dollar sign in a name is no formula
+    "svg.fonttype": "none",
+    "svg.hashsalt": "shared_control_env",
+}
+"""Of all plots: they take the page's colours, their text can be selected, and the same figure gives the same text."""
 
 MARKERS = "osD^vP*X<>hd"
 
@@ -37,7 +60,7 @@ class Cell(NamedTuple):
     Attributes:
         interval: the numbers.
         best: whether no other pair's estimate is better.
-        tied: whether its interval overlaps the best one's.
+        tied: whether it cannot be told from the best: the intervals overlap, or there are none.
     """
 
     interval: Interval
@@ -73,14 +96,14 @@ def write_report(
     """
     environment = Environment(loader=PackageLoader("shared_control_env.evaluation", "."), autoescape=True)
     environment.filters["number"] = _number
-    rows = summarise(table, metrics)
+    rows = summarise(table, metrics) if len(table) else []
     page = environment.get_template("report.html.j2").render(
         episodes=len(table),
         metrics=metrics,
         statistics=list(STATISTICS),
         rows=rows,
         provenance=provenance,
-        plots=draw_plots(table, rows) if len(table) else [],
+        plots=draw_plots(table, rows, metrics) if len(table) else [],
         gallery=gallery(table),
     )
     write_atomically(path, lambda draft: draft.write_text(page, encoding="utf-8"))
@@ -95,7 +118,7 @@ def summarise(table: pd.DataFrame, metrics: Mapping[str, Metric]) -> list[Row]:
         strata = part.groupby(["scenario", "degradation"]).ngroup().to_numpy()
         pair = str(authority), str(driver)
         sizes[pair] = len(part)
-        found[pair] = {name: intervals(part[name].to_numpy(dtype=float), strata, rng) for name in metrics}
+        found[pair] = intervals({name: part[name].to_numpy(dtype=float) for name in metrics}, strata, rng)
     bests = {
         (name, statistic): _best([pair[name][statistic] for pair in found.values()], metrics[name].better)
         for name in metrics
@@ -115,9 +138,9 @@ def summarise(table: pd.DataFrame, metrics: Mapping[str, Metric]) -> list[Row]:
 
 
 def _best(candidates: Sequence[Interval], better: str) -> Interval | None:
-    """The best of some intervals in a metric's direction; None where there is none."""
+    """The best of some intervals in a metric's direction; None where there is none or all are the same."""
     defined = [interval for interval in candidates if interval.n > 0]
-    if better == "neither" or not defined:
+    if better == "neither" or len({interval.estimate for interval in defined}) < 2:
         return None
     return (min if better == "lower" else max)(defined, key=lambda interval: interval.estimate)
 
@@ -125,7 +148,7 @@ def _best(candidates: Sequence[Interval], better: str) -> Interval | None:
 def _cell(interval: Interval, best: Interval | None) -> Cell:
     if best is None or interval.n == 0:
         return Cell(interval, False, False)
-    return Cell(interval, interval.estimate == best.estimate, interval.overlaps(best))
+    return Cell(interval, interval.estimate == best.estimate, not interval.distinct_from(best))
 
 
 def _number(value: float) -> str:
@@ -134,66 +157,105 @@ def _number(value: float) -> str:
 
 
 def gallery(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """Failed episodes, spread over degradations, authorities and drivers, with the command that shows each again."""
+    """The worst failed episodes, spread over all that names them, with the command that shows each again."""
+    names = ["scenario", "degradation", "driver", "authority", "seed"]
     failed = table[table["terminated"].astype(bool)] if len(table) else table
-    chosen = failed.groupby(["degradation", "authority"]).head(1) if len(failed) else failed
-    if len(chosen) > GALLERY:
-        chosen = chosen.iloc[np.linspace(0, len(chosen) - 1, GALLERY).astype(int)]
-    names = ("scenario", "degradation", "driver", "authority", "seed")
+    chosen = _spread(_worst_first(failed), names[:-1], GALLERY) if len(failed) else failed
     return [
         {
             **{name: row[name] for name in names},
             "what": "collision" if row.get("collisions", 0.0) > 0.0 else "off the road",
             "when": row.get("duration", np.nan),
-            "command": "shared-control replay " + " ".join(f"--{name} {row[name]}" for name in names),
+            "command": shlex.join(
+                ["shared-control", "replay", *(part for name in names for part in (f"--{name}", str(row[name])))]
+            ),
         }
         for row in chosen.to_dict("records")
     ]
 
 
-def draw_plots(table: pd.DataFrame, rows: Sequence[Row]) -> list[tuple[str, Markup]]:
-    """Titles and pictures."""
-    shown = [name for name in SHOWN if name in table]
-    plots = [
-        ("Interquartile means with their 95 % intervals", _svg(draw_intervals(rows, shown))),
-        ("Distributions over all episodes", _svg(draw_distributions(table, shown))),
-        ("Failures by degradation and authority", _svg(draw_failures(table))),
-    ]
+def _worst_first(failed: pd.DataFrame) -> pd.DataFrame:
+    """Collisions before departures from the road, and the sooner the worse, as far as the table has these columns."""
+    keys = {"collisions": False, "duration": True}
+    present = [key for key in keys if key in failed]
+    return failed.sort_values(present, ascending=[keys[key] for key in present], kind="stable") if present else failed
+
+
+def _spread(table: pd.DataFrame, names: Sequence[str], n: int) -> pd.DataFrame:
+    """Up to n rows: each time the first of those that have least in common with the rows already taken."""
+    values = table[list(names)].astype(str).to_numpy()
+    in_common = np.zeros(len(table))
+    chosen: list[int] = []
+    for _ in range(min(n, len(table))):
+        chosen.append(int(np.argmin(in_common)))
+        in_common += (values == values[chosen[-1]]).sum(axis=1)
+        in_common[chosen[-1]] = np.inf
+    return table.iloc[chosen]
+
+
+def draw_plots(
+    table: pd.DataFrame, rows: Sequence[Row], metrics: Mapping[str, Metric]
+) -> list[tuple[str, str, Markup]]:
+    """Titles, explanations and pictures; those of metrics only where there are some to show."""
+    shown = {name: f"{name} [{metrics[name].unit}]" for name in SHOWN if name in metrics}
+    plots = []
+    with mpl.rc_context(STYLE):
+        if shown:
+            what = "One panel a metric: authorities down, drivers by colour and mark."
+            picture = _svg(draw_intervals(rows, shown), "intervals")
+            plots.append(("Interquartile means with their 95 % intervals", what, picture))
+            what = "Share of the episodes, of all drivers, whose value is at most that on the axis."
+            picture = _svg(draw_distributions(table, shown), "distributions")
+            plots.append(("Distributions by authority", what, picture))
+        what = "Share of the episodes, of all drivers and scenarios, that end in a collision or off the road."
+        plots.append(("Failures by degradation and authority", what, _svg(draw_failures(table), "failures")))
     return plots
 
 
-def draw_intervals(rows: Sequence[Row], shown: Sequence[str]) -> Figure:
-    """A panel a metric: authorities down, drivers side by side."""
+def draw_intervals(rows: Sequence[Row], shown: Mapping[str, str]) -> Figure:
+    """A panel a metric, labelled as ``shown`` says: authorities down, drivers side by side."""
     authorities, drivers = (list(dict.fromkeys(getattr(row, key) for row in rows)) for key in ("authority", "driver"))
     figure, axes = _panels(len(shown), 0.5 + len(authorities) * (0.25 + 0.1 * len(drivers)))
-    for axis, name in zip(axes, shown, strict=True):
+    looks: list[dict[str, Any]] = [
+        {"color": COLOURS[j % len(COLOURS)], "marker": MARKERS[j % len(MARKERS)]} for j in range(len(drivers))
+    ]
+    for axis, (name, label) in zip(axes, shown.items(), strict=True):
         for row in rows:
             value, j = row.cells[name]["IQM"].interval, drivers.index(row.driver)
             y = authorities.index(row.authority) + 0.8 * ((j + 0.5) / len(drivers) - 0.5)
-            axis.plot([value.low, value.high], [y, y], color=COLOURS[j % len(COLOURS)], lw=2)
-            label = row.driver if row.authority == authorities[0] else None
-            axis.plot(value.estimate, y, MARKERS[j % 12], color=COLOURS[j % len(COLOURS)], ms=4, label=label)
-        axis.set_xlabel(name)
+            axis.plot([value.low, value.high], [y, y], color=looks[j]["color"], lw=2)
+            axis.plot(value.estimate, y, ms=4, **looks[j])
+        for between in range(1, len(authorities)):
+            axis.axhline(between - 0.5, color=INK, lw=0.5, alpha=0.3)
+        axis.set_xlabel(label)
         axis.set_yticks(range(len(authorities)), authorities)
-    axes[0].invert_yaxis()
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
+    axes[0].set_ylim(len(authorities) - 0.5, -0.5)
+    _legend(figure, drivers, [{"lw": 2, "ms": 4, **look} for look in looks])
     return figure
 
 
-def draw_distributions(table: pd.DataFrame, shown: Sequence[str]) -> Figure:
-    """A panel a metric: share of episodes under a value, by authority."""
+def draw_distributions(table: pd.DataFrame, shown: Mapping[str, str]) -> Figure:
+    """A panel a metric, labelled as ``shown`` says: share of episodes under a value, by authority."""
+    groups = {str(authority): part for authority, part in table.groupby("authority", sort=False)}
+    looks: list[dict[str, Any]] = [
+        {"color": COLOURS[i % len(COLOURS)], "ls": "-" if i < len(COLOURS) else "--"} for i in range(len(groups))
+    ]
     figure, axes = _panels(len(shown), 3.2)
-    for axis, name in zip(axes, shown, strict=True):
-        for i, (authority, part) in enumerate(table.groupby("authority", sort=False)):
+    for axis, (name, label) in zip(axes, shown.items(), strict=True):
+        for part, look in zip(groups.values(), looks, strict=True):
             values = part[name].to_numpy(dtype=float)
             values = values[np.isfinite(values)]
             if len(values):
-                style = "-" if i < len(COLOURS) else "--"
-                axis.ecdf(values, color=COLOURS[i % len(COLOURS)], ls=style, label=str(authority))
-        axis.set_xlabel(name)
+                axis.ecdf(values, **look)
+        axis.set_xlabel(label)
     axes[0].set_ylabel("share of episodes")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
+    _legend(figure, list(groups), looks)
     return figure
+
+
+def _legend(figure: Figure, names: Sequence[str], looks: Sequence[Mapping[str, Any]]) -> None:
+    """Under the panels; made of the names, as no one panel need have them all."""
+    figure.legend([Line2D([], [], **look) for look in looks], names, loc="outside lower center", ncols=6, frameon=False)
 
 
 def draw_failures(table: pd.DataFrame) -> Figure:
@@ -224,10 +286,11 @@ def _panels(n: int, height: float) -> tuple[Figure, list[Axes]]:
     return figure, axes
 
 
-def _svg(figure: Figure) -> Markup:
-    """A figure as an SVG element; the same figure gives the same text."""
+def _svg(figure: Figure, name: str) -> Markup:
+    """A figure as an SVG element with ids of its own, in the page's colours."""
     buffer = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "shared_control_env", "svg.fonttype": "path"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = buffer.getvalue()
-    return Markup(text[text.index("<svg") :])
+    text = text[text.index("<svg") :].replace(INK, "currentColor")
+    own = rf"\1{name}-"  # the page holds several pictures, and an id counts once a page
+    return Markup(re.sub("<[^>]+>", lambda tag: re.sub(r'(\bid="|url\(#|href="#)', own, tag[0]), text))

@@ -2,11 +2,15 @@
 
 As Agarwal et al. recommend (Deep Reinforcement Learning at the Edge of the Statistical Precipice, NeurIPS 2021):
 episodes are resampled within their stratum (scenario and degradation), and the interval is that of percentiles.
+
+A stratum is resampled from as many values as it has, so its variance comes out short by 1 / (values a stratum): with
+few seeds the intervals are too narrow. Of normal values in 30 strata the nominal 95 % cover the mean in 83 % of the
+cases with 2 seeds, 88 % with 3, 91 % with 5, 94 % with 10 or 20. A stratum of one value adds no width at all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -33,27 +37,66 @@ class Interval(NamedTuple):
     high: float
     n: int
 
-    def overlaps(self, other: Interval) -> bool:
-        """Whether two intervals have a number in common."""
-        return self.low <= other.high and other.low <= self.high
+    def distinct_from(self, other: Interval) -> bool:
+        """Whether the intervals have no number in common; without an interval nothing can be told apart."""
+        return self.low > other.high or other.low > self.high
 
 
-def mean(values: np.ndarray) -> np.ndarray:
-    """Mean over the last axis."""
-    return np.mean(values, axis=-1)
+def mean(values: np.ndarray) -> float:
+    """Mean of values, shape (n,)."""
+    return float(np.mean(values))
 
 
-def interquartile_mean(values: np.ndarray) -> np.ndarray:
-    """Mean of the middle half over the last axis: a quarter of the values, rounded down, is left out at each end."""
-    return stats.trim_mean(values, 0.25, axis=-1)
+def interquartile_mean(values: np.ndarray) -> float:
+    """Mean of the middle half of values, shape (n,): a quarter, rounded down, is left out at each end."""
+    return float(stats.trim_mean(values, 0.25))
 
 
-STATISTICS: dict[str, Callable[[np.ndarray], np.ndarray]] = {"mean": mean, "IQM": interquartile_mean}
+def means_of_samples(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """:func:`mean` of every sample, shape (samples,).
+
+    Args:
+        values: shape (n,).
+        counts: how often each value is in each sample, shape (samples, n).
+    """
+    return counts @ values / len(values)
+
+
+def interquartile_means_of_samples(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """:func:`interquartile_mean` of every sample, shape (samples,); arguments as in :func:`means_of_samples`.
+
+    The sum over the middle half is taken by parts, from how many of a sample lie at or below each value: no sample
+    has to be sorted.
+    """
+    n, left_out = len(values), len(values) // 4
+    order = np.argsort(values, kind="stable")
+    ordered = values[order]
+    below = np.clip(np.cumsum(counts[:, order], axis=1), left_out, n - left_out)[:, :-1]
+    total = (n - left_out) * ordered[-1] - left_out * ordered[0] - below @ np.diff(ordered)
+    return total / (n - 2 * left_out)
+
+
+class Statistic(NamedTuple):
+    """A statistic.
+
+    Attributes:
+        of_values: of values, shape (n,).
+        of_samples: of every sample, from values and counts as in :func:`means_of_samples`.
+    """
+
+    of_values: Callable[[np.ndarray], float]
+    of_samples: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+STATISTICS = {
+    "mean": Statistic(mean, means_of_samples),
+    "IQM": Statistic(interquartile_mean, interquartile_means_of_samples),
+}
 """Statistics by name."""
 
 
 def resample(strata: np.ndarray, rng: np.random.Generator, resamples: int = RESAMPLES) -> np.ndarray:
-    """Indices of bootstrap samples, drawn with replacement within every stratum.
+    """Bootstrap samples, drawn with replacement within every stratum.
 
     Args:
         strata: stratum of every value, shape (n,).
@@ -61,39 +104,53 @@ def resample(strata: np.ndarray, rng: np.random.Generator, resamples: int = RESA
         resamples: how many samples.
 
     Returns:
-        Shape (resamples, n); column i holds indices of the stratum of value i.
+        How often each value is in each sample, shape (resamples, n).
     """
-    indices = np.empty((resamples, len(strata)), dtype=np.int64)
-    for stratum in np.unique(strata):
-        members = np.flatnonzero(strata == stratum)
-        indices[:, members] = members[rng.integers(len(members), size=(resamples, len(members)))]
-    return indices
+    _, stratum, size = np.unique(strata, return_inverse=True, return_counts=True)
+    members, first = np.argsort(stratum, kind="stable"), np.cumsum(size) - size
+    drawn = rng.random((resamples, len(strata))) * size[stratum]
+    indices = members[first[stratum] + drawn.astype(np.int64)] + len(strata) * np.arange(resamples)[:, None]
+    return np.bincount(indices.ravel(), minlength=resamples * len(strata)).reshape(resamples, -1).astype(float)
 
 
 def intervals(
-    values: np.ndarray, strata: np.ndarray, rng: np.random.Generator, resamples: int = RESAMPLES
-) -> dict[str, Interval]:
-    """Every statistic of some values with its interval.
+    columns: Mapping[str, np.ndarray], strata: np.ndarray, rng: np.random.Generator, resamples: int = RESAMPLES
+) -> dict[str, dict[str, Interval]]:
+    """Every statistic of some columns with its interval.
 
-    Values that are not finite are those of episodes for which the metric is not defined; they are left out.
+    Values that are not finite are those of episodes for which the metric is not defined; they are left out. Columns
+    that are defined for the same episodes share their samples.
 
     Args:
-        values: shape (n,).
+        columns: values by name, each of shape (n,).
         strata: stratum of every value, shape (n,).
         rng: generator.
         resamples: of the bootstrap.
+
+    Returns:
+        Intervals by column, then by statistic.
     """
-    defined = np.isfinite(values)
-    values, strata = values[defined], strata[defined]
-    if len(values) == 0:
-        return dict.fromkeys(STATISTICS, Interval(np.nan, np.nan, np.nan, 0))
-    estimates = {name: float(statistic(values)) for name, statistic in STATISTICS.items()}
-    if len(np.unique(strata)) == len(strata):
-        return {name: Interval(estimate, np.nan, np.nan, len(values)) for name, estimate in estimates.items()}
-    samples = values[resample(strata, rng, resamples)]
-    tails = [50.0 - 0.5 * COVERAGE, 50.0 + 0.5 * COVERAGE]
+    shared: dict[bytes, np.ndarray | None] = {}
     found = {}
-    for name, statistic in STATISTICS.items():
-        low, high = np.percentile(statistic(samples), tails)
-        found[name] = Interval(estimates[name], float(low), float(high), len(values))
+    for name, column in columns.items():
+        defined = np.isfinite(column)
+        key = defined.tobytes()
+        if key not in shared:
+            remaining = strata[defined]
+            repeated = len(np.unique(remaining)) < len(remaining)
+            shared[key] = resample(remaining, rng, resamples) if repeated else None
+        values, counts = column[defined], shared[key]
+        found[name] = {label: _interval(values, counts, statistic) for label, statistic in STATISTICS.items()}
     return found
+
+
+def _interval(values: np.ndarray, counts: np.ndarray | None, statistic: Statistic) -> Interval:
+    """A statistic of finite values; without an interval where there are no samples."""
+    if len(values) == 0:
+        return Interval(np.nan, np.nan, np.nan, 0)
+    estimate = statistic.of_values(values)
+    if counts is None:
+        return Interval(estimate, np.nan, np.nan, len(values))
+    tails = [50.0 - 0.5 * COVERAGE, 50.0 + 0.5 * COVERAGE]
+    low, high = np.percentile(statistic.of_samples(values, counts), tails)
+    return Interval(estimate, float(low), float(high), len(values))

@@ -64,6 +64,11 @@ def _means(values: pd.DataFrame, strata: np.ndarray, rng: np.random.Generator) -
     return {name: statistics["mean"] for name, statistics in intervals(columns, strata, rng).items()}
 
 
+def _shown(value: Interval) -> str:
+    """A mean with its interval; one training seed has none."""
+    return f"{value.estimate:.3g}" + (f" \\[{value.low:.3g}, {value.high:.3g}]" if np.isfinite(value.low) else "")
+
+
 def main(
     policies: Annotated[list[Path], typer.Argument(help="Files best.npz, one a training seed.", exists=True)],
     scenarios: Annotated[str, typer.Option(help="Names separated by commas.")] = "lane_keeping",
@@ -82,8 +87,7 @@ def main(
     title = f"{len(table)} episodes, law proportional, mean and 95 % interval"
     printed = Table("faults", "driver", *METRICS, title=title)
     for (kind, driver), values in compared(table).items():
-        cells = [f"{v.estimate:.3g} [{v.low:.3g}, {v.high:.3g}]" for v in values.values()]
-        printed.add_row(kind, driver, *(cell.replace("[", "\\[") for cell in cells))
+        printed.add_row(kind, driver, *(_shown(value) for value in values.values()))
     Console().print(printed)
 
 

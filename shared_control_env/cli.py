@@ -93,10 +93,14 @@ def benchmark(
 
 def summary(table: Any) -> Table:
     """Means of the main metrics by authority and driver."""
-    printed = Table("authority", "driver", *COLUMNS, title="Means over all episodes")
+    printed = Table(title="Means over all episodes")
+    for name in ("authority", "driver"):
+        printed.add_column(name, no_wrap=True)
+    for name in COLUMNS:
+        printed.add_column(name.replace("_", " "), justify="right", min_width=8)
     means = table.groupby(["authority", "driver"])[list(COLUMNS)].mean()
     for (authority, driver), row in means.iterrows():
-        printed.add_row(authority, driver, *(f"{value:.3g}" for value in row))
+        printed.add_row(authority, driver, *(f"{value:.2g}" for value in row))
     return printed
 
 

@@ -28,7 +28,7 @@ from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
-COLUMNS = ("collisions", "lane_departures", "lateral_rms", "driver_effort", "conflict", "false_authority_loss")
+COLUMNS = ("collisions", "lateral_rms", "driver_effort", "conflict")
 """Metrics of the table that is printed; all are in the report."""
 
 
@@ -97,7 +97,7 @@ def summary(table: Any) -> Table:
     for name in ("authority", "driver"):
         printed.add_column(name, no_wrap=True)
     for name in COLUMNS:
-        printed.add_column(name.replace("_", " "), justify="right", min_width=8)
+        printed.add_column(name.replace("_", " "), justify="right", min_width=len(max(name.split("_"), key=len)))
     means = table.groupby(["authority", "driver"])[list(COLUMNS)].mean()
     for (authority, driver), row in means.iterrows():
         printed.add_row(authority, driver, *(f"{value:.2g}" for value in row))

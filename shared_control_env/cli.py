@@ -93,7 +93,7 @@ def benchmark(
 
 def summary(table: Any) -> Table:
     """Means of the main metrics by authority and driver."""
-    printed = Table(title="Means over all episodes")
+    printed = Table(title="Means over all episodes", pad_edge=False)
     for name in ("authority", "driver"):
         printed.add_column(name, no_wrap=True)
     for name in COLUMNS:

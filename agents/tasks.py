@@ -7,9 +7,10 @@ from typing import Any
 import gymnasium as gym
 from stable_baselines3.common.vec_env import VecEnv, VecFrameStack, VecMonitor
 
-import shared_control_env  # noqa: F401  (registers the environments)
 from agents.history import HISTORY
+from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
 
 TASKS = ("driver", "allocator")
@@ -39,11 +40,11 @@ def training_config(scenario_config: dict[str, Any]) -> dict[str, Any]:
         "authority": {"law": "proportional"},
         "faults": [],
         "degradations": degradations,
-        "randomise": [*scenario_config["randomise"], *LAG_RANGES],
+        "randomise": [*scenario_config.get("randomise", []), *LAG_RANGES],
     }
 
 
-def make_environment(id: str, task: str, num_envs: int, seed: int, config: dict[str, Any] | None = None) -> VecEnv:
+def make_environment(id: str, task: str, num_envs: int, seed: int) -> VecEnv:
     """Environments of a task for Stable-Baselines3, with the history stacked and episodes monitored.
 
     Args:
@@ -51,12 +52,10 @@ def make_environment(id: str, task: str, num_envs: int, seed: int, config: dict[
         task: one of :data:`TASKS`.
         num_envs: how many.
         seed: of the first one; the others follow.
-        config: settings instead of :func:`training_config`.
     """
     bound: Any = {"limiter": task == "driver", "driver": task == "allocator"}
-    env = gym.make_vec(id, num_envs=num_envs, autoreset_mode="same_step", **bound)
-    changes = training_config(env.unwrapped.config) if config is None else config  # type: ignore[attr-defined]
-    env.reset(options={"config": changes})
+    config = training_config(CASES[ENVIRONMENTS[id]].settings)
+    env = gym.make_vec(id, num_envs=num_envs, autoreset_mode="same_step", config=config, **bound)
     stacked = VecMonitor(VecFrameStack(StableBaselinesVecEnv(env), HISTORY))
     stacked.seed(seed)
     return stacked

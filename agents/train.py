@@ -106,17 +106,17 @@ class Training:
     def __init__(self, folder: Path, algorithm: str, id: str, task: str, seed: int) -> None:
         self.folder, self.algorithm, self.id, self.task, self.seed = folder, algorithm, id, task, seed
         self.parameters = hyperparameters(algorithm, id)
-        self.environments, self.segment = self.parameters.pop("environments"), self.parameters.pop("segment")
         self.card: dict[str, Any] = {
             "algorithm": algorithm,
             "environment": id,
             "task": task,
             "seed": seed,
             "history": HISTORY,
-            "hyperparameters": hyperparameters(algorithm, id),
+            "hyperparameters": dict(self.parameters),
             "features": [name for name, _ in FEATURES],
             "versions": versions(),
         }
+        self.environments, self.segment = self.parameters.pop("environments"), self.parameters.pop("segment")
         self.state: dict[str, Any] = {"card": self.card, "steps": 0, "scores": []}
         self.state |= {"seconds": 0.0, "in_environment": 0.0}
         if (folder / PROGRESS).is_file():

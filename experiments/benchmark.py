@@ -15,6 +15,7 @@ import typer
 
 from shared_control_env.cli import benchmark as run_suite
 from shared_control_env.evaluation import AUTHORITIES, DRIVERS
+from shared_control_env.evaluation.statistics import intervals
 from shared_control_env.evaluation.storage import TABLE, write_atomically
 
 SHOWN = ("mpc", "scripted", "distracted", "over_reacting", "fighting", "none")
@@ -44,10 +45,9 @@ def difference(
     keys = ["scenario", "degradation", "seed"]
     pairs = one[one["authority"] == first].merge(one[one["authority"] == second], on=keys, suffixes=("", "_other"))
     change = pairs[metric].to_numpy(dtype=float) - pairs[f"{metric}_other"].to_numpy(dtype=float)
-    rng = np.random.default_rng(0)
-    means = change[rng.integers(len(change), size=(RESAMPLES, len(change)))].mean(axis=1)
-    low, high = np.percentile(means, [2.5, 97.5])
-    return float(change.mean()), float(low), float(high)
+    columns = intervals({metric: change}, np.zeros(len(change)), np.random.default_rng(0), RESAMPLES)
+    mean = columns[metric]["mean"]
+    return mean.estimate, mean.low, mean.high
 
 
 def compared(table: pd.DataFrame, driver: str, first: str, second: str) -> str:

@@ -24,6 +24,7 @@ except ImportError:
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose
+from shared_control_env.evaluation.episodes import AS_GIVEN
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
 
@@ -109,7 +110,7 @@ def replay(
     scenario: Annotated[str, typer.Option(help="Scenario of the episode.")],
     driver: Annotated[str, typer.Option(help="Driver.")] = "mpc",
     authority: Annotated[str, typer.Option(help="Authority.")] = "paper",
-    degradation: Annotated[str, typer.Option(help="Degradation; own for the scenario's.")] = "own",
+    degradation: Annotated[str, typer.Option(help="Degradation; own for the scenario's.")] = AS_GIVEN,
     seed: Annotated[int, typer.Option(min=0, help="Seed.")] = 0,
     video: Annotated[Path | None, typer.Option(help="MP4 to write.")] = None,
 ) -> None:
@@ -118,13 +119,13 @@ def replay(
 
     try:
         choose("scenario", scenario, CASES)
-        choose("degradation", degradation, {"own": None, **DEGRADATIONS})
+        choose("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
         entries = choose("driver", driver, DRIVERS)[driver], choose("authority", authority, AUTHORITIES)[authority]
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     if video is not None and video.exists():
         raise typer.BadParameter(f"{video} exists already; choose another name")
-    given = None if degradation == "own" else degradation
+    given = None if degradation == AS_GIVEN else degradation
     frames: list[Any] | None = None if video is None else []
     measured = replay_episode(scenario, (driver, entries[0]), (authority, entries[1]), given, seed, frames)
     console = Console()

@@ -35,6 +35,9 @@ _FAULTS = [name for name, entry in DEGRADATIONS.items() if entry is not None]
 _CURVATURES = [sign / radius for radius in (60.0, 80.0, 120.0, 200.0) for sign in (1.0, -1.0)]
 """Curves to the left and to the right [1/m]."""
 
+_BEND_ROAD = {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0, "curvature": 1.0 / 60.0}]}
+"""A straight, then an arc whose curvature is drawn."""
+
 TWO_LANE = Case(
     id="SharedControl/TwoLane-v0",
     description="Case 1: straight, two lanes, following a slower vehicle at 12 m/s; steering drifts off by 0.3 rad",
@@ -92,7 +95,7 @@ BEND = Case(
     id="SharedControl/Bend-v0",
     description="a curve of 60 to 200 m radius to either side, free road",
     settings={
-        "road": {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0, "curvature": 1.0 / 60.0}]},
+        "road": _BEND_ROAD,
         "ego": {"speed": 12.0},
         "degradations": _FAULTS,
         "screen_height": 632,
@@ -233,7 +236,7 @@ CURVE_WITH_LEAD = Case(
     id="SharedControl/CurveWithLead-v0",
     description="a curve of 60 to 200 m radius to either side behind a vehicle that follows the road at 9 to 12 m/s",
     settings={
-        "road": {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0, "curvature": 1.0 / 60.0}]},
+        "road": _BEND_ROAD,
         "ego": {"speed": 12.0},
         "vehicles": [{"lane": 0, "position": 20.0, "speed": 11.0}],
         "degradations": _FAULTS,

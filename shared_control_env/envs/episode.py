@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.core.parameters import Limits
-from shared_control_env.envs.config import RandomSettings, Settings, check, plain
+from shared_control_env.envs.config import NOISES, RandomSettings, Settings, check, plain
 from shared_control_env.envs.degradations import draw_degradation
 
 
 def is_random(settings: Settings) -> bool:
     """Whether anything is drawn at the start of an episode."""
-    noisy = any(fault.kind in ("white_noise", "coloured_noise") and fault.seed is None for fault in settings.faults)
+    noisy = any(fault.kind in NOISES and fault.seed is None for fault in settings.faults)
     return bool(settings.randomise or settings.degradations or noisy)
 
 

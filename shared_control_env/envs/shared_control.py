@@ -12,6 +12,7 @@ from highway_env.vehicle.graphics import VehicleGraphics
 
 from shared_control_env.controllers.automation import Automation
 from shared_control_env.core import single
+from shared_control_env.core.degradation import has_set_in
 from shared_control_env.core.info import INFO, as_dict
 from shared_control_env.core.records import FAULT_MEMORY, HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
 from shared_control_env.core.reward import TERMS
@@ -252,8 +253,7 @@ class SharedControlEnv(AbstractEnv):
     @property
     def fault_active(self) -> bool:
         """Whether any degradation is there at the scene's time."""
-        t = self.scene["t"]
-        return bool(((self.faults["onset"] <= t) & (t < self.faults["onset"] + self.faults["duration"])).any())
+        return any(has_set_in(fault, float(self.scene["t"])) for fault in self.faults)
 
     @property
     def traffic(self) -> np.ndarray:

@@ -238,7 +238,8 @@ def run(batch: Batch) -> list[dict[str, Any]]:
     begin = perf_counter()
     env = make_environment(batch)
     seeds = [seed for _, seed in batch.episodes]
-    configs = [settings_of(batch, degradation) for degradation, _ in batch.episodes]
+    changes = {degradation: settings_of(batch, degradation) for degradation, _ in batch.episodes}
+    configs = [changes[degradation] for degradation, _ in batch.episodes]
     observations, _ = env.reset(seed=seeds, options={"config": configs})
     settings, drawn = env.episodes[0], env.episodes
     recorder, policies = Recorder(settings.steps, len(batch.episodes)), Policies(batch, env)

@@ -377,7 +377,9 @@ class SharedControlVectorEnv(VectorEnv):
                 f"{self.num_envs} environments"
             )
         else:
-            templates = [configuration.check(configuration.merge(base, entry)) for entry in config]
+            different = {id(entry): entry for entry in config}
+            checked = {key: configuration.check(configuration.merge(base, entry)) for key, entry in different.items()}
+            templates = [checked[id(entry)] for entry in config]
             for i, template in enumerate(templates):
                 for name in ONE_FOR_ALL:
                     if getattr(template, name) != getattr(self._settings, name):

@@ -2,15 +2,18 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
+RLLIB = $(VENV)-rllib
 PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
-.PHONY: help install reproduce reference sensitivity test lint types bench figures clean
+.PHONY: help install reproduce reference sensitivity policies test rllib lint types bench figures clean
 
 help:
 	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
 	@echo "make reference  run the reference benchmark and write its table and report to results/reference"
 	@echo "make sensitivity  vary what the paper leaves open, and write a table and a picture to results/sensitivity"
 	@echo "make test       lint, types and all tests"
+	@echo "make rllib      the tests of training on Ray, in a virtual environment of their own"
+	@echo "make policies   train the policies that ship, compare them, and write them and their card to agents/policies"
 	@echo "make bench      speed, as ratios against highway-env and SciPy in the same run"
 	@echo "make figures    copy the README's pictures from results/paper"
 	@echo "make clean      remove the virtual environment"
@@ -40,6 +43,9 @@ reference: $(VENV)/.experiments
 sensitivity: $(VENV)/.experiments
 	$(BIN)/python -m experiments.sensitivity $(ARGS)
 
+policies: $(VENV)/.dev
+	$(BIN)/python -m experiments.policies $(ARGS)
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -50,6 +56,16 @@ types: $(VENV)/.dev
 test: lint types
 	$(BIN)/python -m pytest -q -n auto $(ARGS)
 
+# RLlib pins an older Gymnasium, so it has an environment of its own.
+$(RLLIB)/.rllib: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(RLLIB)
+	grep -v '^gymnasium==' constraints.txt > $(RLLIB)/constraints.txt
+	$(RLLIB)/bin/python -m pip --disable-pip-version-check --quiet install -c $(RLLIB)/constraints.txt -e ".[rllib]" pytest hypothesis
+	@touch $@
+
+rllib: $(RLLIB)/.rllib
+	$(RLLIB)/bin/python -m pytest -q tests/agents/test_rllib.py $(ARGS)
+
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks $(ARGS)
 
@@ -58,4 +74,4 @@ figures: reproduce
 	cp results/paper/case1_path.png results/paper/case2_path.png docs/
 
 clean:
-	rm -rf $(VENV)
+	rm -rf $(VENV) $(RLLIB)

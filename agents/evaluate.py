@@ -1,94 +1,253 @@
-"""Compare trained drivers with the predictive and the scripted one, on seeds and faults that training left out."""
+"""Compare trained drivers or allocators with the others, on seeds and faults that training left out.
+
+``python -m agents.evaluate`` takes those that ship; ``python -m agents.evaluate results/train/*/best.npz`` others.
+"""
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from scipy import stats
 
-from agents.policy import LearnedDriver, Policy
-from agents.tasks import HELD_OUT_KINDS, HELD_OUT_SEED
+from agents.drivers import authority_entry, driver_entry, shipped
+from agents.policy import Policy
+from agents.tasks import HELD_OUT_DEGRADATIONS, HELD_OUT_SEED, TASKS
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
-from shared_control_env.evaluation import DRIVERS, DriverEntry, Suite, evaluate
-from shared_control_env.evaluation.statistics import Interval, intervals
+from shared_control_env.evaluation import Suite, evaluate
+from shared_control_env.evaluation.catalogue import choose
+from shared_control_env.evaluation.statistics import COVERAGE, Interval, intervals
+from shared_control_env.registration import ENVIRONMENTS
 
-METRICS = ("lateral_rms", "driver_effort", "collisions", "road_departures", "lane_departures")
-"""Metrics of the table."""
+METRICS = (
+    "lateral_rms",
+    "driver_effort",
+    "terminated",
+    "collisions",
+    "road_departures",
+    "lane_departures",
+    "speed_rms",
+)
+"""Columns of the benchmark's table that are compared, less being better; terminated: by either of the next two."""
 
-COMPARED = ("mpc", "scripted", "none")
-"""Drivers that the trained ones are compared with, under the same lag and the same limiter."""
+COMPARED = {
+    "driver": ("mpc", "scripted", "none"),
+    "allocator": ("proportional", "none", "fixed", "linear", "takeover", "time_based"),
+}
+"""Drivers of the catalogue that the trained ones are compared with, and authorities."""
+
+BASELINE = {"driver": "mpc", "allocator": "proportional"}
+"""Which of them a trained one has to beat: the paper's driver, and the paper's fuzzy inference."""
 
 LEARNED = "learned"
-"""Name of the trained drivers, with the number of the file where there are several."""
+"""Name of the trained ones taken together, each training seed one sample."""
+
+KINDS = ("left out of training", "seen in training")
+"""What a degradation was to the training."""
 
 
-def measure(policies: list[Policy], scenarios: tuple[str, ...], seeds: int) -> pd.DataFrame:
-    """Episodes of all drivers under every degradation, with held-out seeds; ``kind`` says whether training knew it."""
-    makers = [partial(LearnedDriver, policy) for policy in policies]
-    learned = {f"{LEARNED} {i}": DriverEntry("trained", make) for i, make in enumerate(makers)}
-    drivers = {**learned, **{name: DRIVERS[name] for name in COMPARED}}
-    suite = Suite("held-out seeds", scenarios, tuple(DEGRADATIONS))
-    table = evaluate(drivers, "proportional", suite, seeds=range(HELD_OUT_SEED, HELD_OUT_SEED + seeds))
-    held_out = table["degradation"].isin(HELD_OUT_KINDS)
-    return table.assign(kind=np.where(held_out, "left out of training", "seen in training"))
+Values = dict[str, Interval]
+"""Every metric's mean with its interval."""
 
 
-def compared(table: pd.DataFrame) -> dict[tuple[str, str], dict[str, Interval]]:
-    """Every metric by kind of fault and driver; the trained drivers as one, their seeds the sample.
+class Row(NamedTuple):
+    """A row of the comparison.
 
-    The interval of the trained ones is over training seeds, one mean each; that of the others is over episodes.
+    Attributes:
+        kind: one of :data:`KINDS`.
+        name: of a driver or an authority; :data:`LEARNED`; or ``learned - baseline``.
+        values: of :data:`METRICS`.
     """
-    rng = np.random.default_rng(0)
-    found: dict[tuple[str, str], dict[str, Interval]] = {}
+
+    kind: str
+    name: str
+    values: Values
+
+
+def measure(
+    task: str,
+    sources: Sequence[str],
+    scenarios: Sequence[str],
+    seeds: int,
+    jobs: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> pd.DataFrame:
+    """Episodes of all drivers under the fuzzy limiter, or of all authorities with the predictive driver.
+
+    Args:
+        task: key of :data:`agents.tasks.TASKS`.
+        sources: the trained ones, as :func:`agents.drivers.driver_entry` takes them.
+        scenarios: keys of :data:`envs.cases.CASES`.
+        seeds: how many of each degradation, from :data:`agents.tasks.HELD_OUT_SEED` on.
+        jobs: processes.
+        progress: called with the number of episodes done and of all.
+
+    Returns:
+        The benchmark's table; ``name`` is the driver or authority, ``kind`` says whether training knew the fault.
+    """
+    make: Callable[[str], Any] = driver_entry if task == "driver" else authority_entry
+    learned = {f"{LEARNED} {i}": make(source) for i, source in enumerate(sources)}
+    entries = {**learned, **{name: make(name) for name in COMPARED[task]}}
+    drivers, authorities = (entries, "proportional") if task == "driver" else ("mpc", entries)
+    suite = Suite("held-out seeds", tuple(scenarios), tuple(DEGRADATIONS))
+    numbers = range(HELD_OUT_SEED, HELD_OUT_SEED + seeds)
+    table = evaluate(drivers, authorities, suite, seeds=numbers, jobs=jobs, progress=progress)
+    held_out = table["degradation"].isin(HELD_OUT_DEGRADATIONS)
+    name = table["driver" if task == "driver" else "authority"]
+    return table.assign(name=name, kind=np.where(held_out, *KINDS))
+
+
+def compare(table: pd.DataFrame, task: str) -> list[Row]:
+    """Every metric by kind of fault and name, and what the trained ones differ by from the baseline.
+
+    The intervals of the trained ones are Student's over training seeds, of one mean each over the same episodes; those
+    of the others are bootstrapped over episodes. Those of the differences hold both, the episodes in pairs; there are
+    none with a single training seed or a single episode of each scenario and degradation.
+    """
+    rng, baseline = np.random.default_rng(0), BASELINE[task]
+    rows = []
     for kind, part in table.groupby("kind"):
-        learned = part[part["driver"].str.startswith(LEARNED)]
-        means = learned.groupby("driver")[list(METRICS)].mean()
-        found[str(kind), LEARNED] = _means(means, np.zeros(len(means)), rng)
-        for driver in COMPARED:
-            episodes = part[part["driver"] == driver]
+        learned = part[part["name"].str.startswith(LEARNED)]
+        means = learned.groupby("name")[list(METRICS)].mean()
+        rows.append(Row(str(kind), LEARNED, {m: over_seeds(means[m].to_numpy(float)) for m in METRICS}))
+        for name in COMPARED[task]:
+            episodes = part[part["name"] == name]
             strata = episodes.groupby(["scenario", "degradation"]).ngroup().to_numpy()
-            found[str(kind), driver] = _means(episodes, strata, rng)
+            columns = {m: episodes[m].to_numpy(float) for m in METRICS}
+            found = {m: statistics["mean"] for m, statistics in intervals(columns, strata, rng).items()}
+            rows.append(Row(str(kind), name, found))
+        rows.append(Row(str(kind), f"{LEARNED} - {baseline}", _difference(part, means, baseline, rng)))
+    return rows
+
+
+def _difference(
+    part: pd.DataFrame, means: pd.DataFrame, baseline: str, rng: np.random.Generator
+) -> dict[str, Interval]:
+    """What the trained ones differ by from the baseline, with both intervals as one: seeds vary, and episodes do."""
+    keys = ["scenario", "degradation", "seed"]
+    reference = part[part["name"] == baseline].set_index(keys)[list(METRICS)]
+    learned = part[part["name"].str.startswith(LEARNED)].groupby(keys)[list(METRICS)].mean()
+    paired = (learned - reference).reset_index()
+    strata = paired.groupby(keys[:2]).ngroup().to_numpy()
+    bootstrapped = intervals({m: paired[m].to_numpy(float) for m in METRICS}, strata, rng)
+    found = {}
+    for metric in METRICS:
+        both = over_seeds(means[metric].to_numpy(float) - reference[metric].mean()), bootstrapped[metric]["mean"]
+        low, high = float(np.min([each.low for each in both])), float(np.max([each.high for each in both]))
+        found[metric] = Interval(both[0].estimate, low, high, both[0].n)
     return found
 
 
-def _means(values: pd.DataFrame, strata: np.ndarray, rng: np.random.Generator) -> dict[str, Interval]:
-    """Mean of every metric with its interval."""
-    columns = {name: values[name].to_numpy(dtype=float) for name in METRICS}
-    return {name: statistics["mean"] for name, statistics in intervals(columns, strata, rng).items()}
+def over_seeds(values: np.ndarray) -> Interval:
+    """Mean of one value a training seed, with Student's interval; of a single seed there is none."""
+    n, mean = len(values), float(np.mean(values))
+    if n < 2:
+        return Interval(mean, np.nan, np.nan, n)
+    half = stats.t.ppf(0.5 + COVERAGE / 200.0, n - 1) * np.std(values, ddof=1) / np.sqrt(n)
+    return Interval(mean, mean - half, mean + half, n)
 
 
-def _shown(value: Interval) -> str:
+def losses(table: pd.DataFrame, task: str) -> pd.DataFrame:
+    """Where the trained ones are worse than the baseline: scenario, degradation, metric, both means.
+
+    That is where the whole interval over training seeds of the difference lies above zero. The many pairs are looked at
+    one by one: some losses are chance.
+    """
+    keys, baseline = ["scenario", "degradation"], BASELINE[task]
+    learned = table[table["name"].str.startswith(LEARNED)].groupby([*keys, "name"])[list(METRICS)].mean()
+    reference = table[table["name"] == baseline].groupby(keys)[list(METRICS)].mean()
+    rows = []
+    for where in reference.index:
+        for metric in METRICS:
+            values = learned.xs(where)[metric].to_numpy(float)
+            expected = float(reference.loc[where, metric])
+            if over_seeds(values - expected).low > 0.0:
+                rows.append([*where, metric, float(values.mean()), expected])
+    return pd.DataFrame(rows, columns=[*keys, "metric", LEARNED, baseline])
+
+
+def where_it_loses(table: pd.DataFrame, task: str) -> list[str]:
+    """How many :func:`losses` there are of each metric, and the three largest."""
+    lost, baseline = losses(table, task), BASELINE[task]
+    lines = []
+    for metric, part in lost.groupby("metric", sort=False):
+        worst = part.iloc[(part[LEARNED] - part[baseline]).argsort()[::-1][:3]]
+        examples = ", ".join(
+            f"{scenario} under {degradation} ({ours:.3g}, not {theirs:.3g})"
+            for scenario, degradation, _, ours, theirs in worst.itertuples(index=False)
+        )
+        lines.append(f"- {str(metric).replace('_', ' ')}: {len(part)}; most in {examples}.")
+    return lines or ["- nowhere."]
+
+
+def shown(value: Interval) -> str:
     """A mean with its interval; one training seed has none."""
-    return f"{value.estimate:.3g}" + (f" \\[{value.low:.3g}, {value.high:.3g}]" if np.isfinite(value.low) else "")
+    return f"{value.estimate:.3g}" + (f" [{value.low:.3g}, {value.high:.3g}]" if np.isfinite(value.low) else "")
+
+
+def show(rows: Sequence[Row], console: Console) -> None:
+    """Print the means by kind of fault, and the trained ones' differences with their intervals."""
+    for kind in KINDS:
+        of_kind = [row for row in rows if row.kind == kind]
+        table = Table(
+            "", *(name.replace("_", "\n") for name in METRICS), title=f"faults {kind}", box=None, padding=(0, 1, 0, 0)
+        )
+        for row in of_kind[:-1]:
+            table.add_row(row.name, *(f"{value.estimate:.3g}" for value in row.values.values()))
+        console.print(table)
+        difference = of_kind[-1]
+        console.print(f"{difference.name}, 95 % interval:")
+        for metric, value in difference.values.items():
+            console.print(f"  {metric.replace('_', ' ')}: {shown(value)}", markup=False)
+
+
+def scenarios_of(sources: Mapping[str, Path] | Sequence[str], task: str) -> list[str]:
+    """Scenarios that the policies among the sources were trained in, all of them known to each."""
+    paths = [shipped(task).get(source, Path(source)) for source in sources]
+    known = [Policy.load(path).card["environments"] for path in paths if path.suffix == ".npz"]
+    common = [id for id in ENVIRONMENTS if known and all(id in ids for ids in known)]
+    return [ENVIRONMENTS[id] for id in common] or ["lane_keeping"]
 
 
 def main(
-    policies: Annotated[list[Path], typer.Argument(help="Files best.npz, one a training seed.", exists=True)],
-    scenarios: Annotated[str, typer.Option(help="Names separated by commas.")] = "lane_keeping",
-    seeds: Annotated[int, typer.Option(min=1, help="Held-out seeds of each degradation.")] = 10,
+    sources: Annotated[list[str] | None, typer.Argument(help="Names or files, one a training seed.")] = None,
+    task: Annotated[str, typer.Option(help=f"One of: {', '.join(TASKS)}.")] = "driver",
+    scenarios: Annotated[str, typer.Option(help="Names, separated by commas; by default those of training.")] = "",
+    seeds: Annotated[int, typer.Option(min=1, help="Held-out seeds of each degradation.")] = 3,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
 ) -> None:
-    """Print the table."""
-    names = tuple(scenarios.split(","))
-    for name in names:
-        if name not in CASES:
-            raise typer.BadParameter(f"scenario {name!r} is not known; valid are {', '.join(CASES)}")
+    """Print how trained drivers (or allocators) compare, and where they lose."""
+    console = Console()
     try:
-        loaded = [Policy.load(path) for path in policies]
+        choose("task", task, TASKS)
+        chosen = sources or list(shipped(task))
+        if not chosen:
+            raise ValueError(f"no policy of the task {task!r} ships; name files")
+        names = [name.strip() for name in scenarios.split(",")] if scenarios else scenarios_of(chosen, task)
+        choose("scenario", names, CASES)
+        columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        with Progress(*columns, console=console) as bar:
+            running = bar.add_task("episodes", total=None)
+            update = lambda done, total: bar.update(running, completed=done, total=total)
+            table = measure(task, chosen, names, seeds, jobs, update)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    table = measure(loaded, names, seeds)
-    title = f"{len(table)} episodes, law proportional, mean and 95 % interval"
-    printed = Table("faults", "driver", *METRICS, title=title)
-    for (kind, driver), values in compared(table).items():
-        printed.add_row(kind, driver, *(_shown(value) for value in values.values()))
-    Console().print(printed)
+    console.print(f"{len(table)} episodes of {', '.join(names)}")
+    show(compare(table, task), console)
+    cells = len(table[["scenario", "degradation"]].drop_duplicates())
+    console.print(
+        f"{LEARNED} is worse than {BASELINE[task]}, with all of the interval over training seeds, in so many of "
+        f"{cells} pairs of scenario and degradation:"
+    )
+    console.print("\n".join(where_it_loses(table, task)), markup=False)
 
 
 if __name__ == "__main__":

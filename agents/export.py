@@ -8,15 +8,17 @@ import numpy as np
 import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.policy import Policy
+from agents.policy import Policy, fold
 
 
-def export(model: BaseAlgorithm, card: dict[str, Any]) -> Policy:
+def export(model: BaseAlgorithm, normalisation: VecNormalize | None, card: dict[str, Any]) -> Policy:
     """The deterministic policy of a model of PPO, SAC or TD3.
 
     Args:
         model: trained, with a multilayer perceptron as its policy.
+        normalisation: of its observations, which are not clipped.
         card: kept with it.
     """
     policy: Any = model.policy
@@ -28,9 +30,11 @@ def export(model: BaseAlgorithm, card: dict[str, Any]) -> Policy:
         parts = [part for part in policy.actor.mu if not isinstance(part, torch.nn.Tanh)]
     linear = [part for part in parts if isinstance(part, torch.nn.Linear)]
     layers = [(_array(part.weight), _array(part.bias)) for part in linear]
+    if normalisation is not None:
+        statistics: Any = normalisation.obs_rms
+        layers = fold(layers, statistics.mean, np.sqrt(statistics.var + normalisation.epsilon))
     hidden = "tanh" if any(isinstance(part, torch.nn.Tanh) for part in parts) else "relu"
-    space: Any = model.action_space
-    return Policy(layers, hidden, not isinstance(model, PPO), float(space.low[0]), float(space.high[0]), card)
+    return Policy(layers, hidden, not isinstance(model, PPO), card)
 
 
 def _array(tensor: torch.Tensor) -> np.ndarray:

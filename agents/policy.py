@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from agents.history import History
-from shared_control_env.core.observation import FEATURES
+from agents.history import HISTORY, History
+from agents.views import ALLOCATOR_FEATURES, DRIVER_FEATURES, FEATURES_OF, allocator_view, authority, driver_view
 from shared_control_env.core.parameters import Limits
+from shared_control_env.registration import ENVIRONMENTS
 
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "tanh": np.tanh,
@@ -20,50 +22,48 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 """Nonlinearities of the hidden layers."""
 
 
+Layer: TypeAlias = tuple[np.ndarray, np.ndarray]
+"""Weights (out, in) and biases (out,)."""
+
+
 class Policy:
-    """A multilayer perceptron from a history of observations to an action in [-1, 1] or [0, 1].
+    """A multilayer perceptron from a history of observations to an action in [-1, 1].
 
     Args:
-        layers: weights (out, in) and biases (out,) of every layer.
+        layers: all of them, the input's first.
         hidden: name in :data:`ACTIVATIONS`.
         squashed: whether the output goes through a tanh into the bounds; else it is clipped to them.
-        low, high: bounds of the action.
         card: what it was trained as: algorithm, environment, task, config, seed, versions.
     """
 
     def __init__(
         self,
-        layers: list[tuple[np.ndarray, np.ndarray]],
+        layers: list[Layer],
         hidden: str,
         squashed: bool,
-        low: float,
-        high: float,
         card: dict[str, Any],
     ) -> None:
-        self.layers, self.hidden, self.squashed = layers, hidden, squashed
-        self.low, self.high, self.card = low, high, card
+        self.layers, self.hidden, self.squashed, self.card = layers, hidden, squashed, card
 
     def act(self, stacked: np.ndarray) -> np.ndarray:
         """Action for a history of observations.
 
         Args:
-            stacked: shape (..., HISTORY * 25).
+            stacked: shape (..., HISTORY * size).
         """
         x = stacked
         for weights, biases in self.layers[:-1]:
             x = ACTIVATIONS[self.hidden](x @ weights.T + biases)
         weights, biases = self.layers[-1]
         action = x @ weights.T + biases
-        if self.squashed:
-            return self.low + 0.5 * (np.tanh(action) + 1.0) * (self.high - self.low)
-        return np.clip(action, self.low, self.high)
+        return np.tanh(action) if self.squashed else np.clip(action, -1.0, 1.0)
 
     def save(self, path: Path) -> None:
         """Write the policy as an ``.npz`` file with its card in it."""
         arrays: Any = {
             f"{kind}{i}": a for i, layer in enumerate(self.layers) for kind, a in zip("Wb", layer, strict=True)
         }
-        shape = {"hidden": self.hidden, "squashed": self.squashed, "low": self.low, "high": self.high}
+        shape = {"hidden": self.hidden, "squashed": self.squashed}
         np.savez_compressed(path, card=json.dumps({**self.card, "shape": shape}), **arrays)
 
     @classmethod
@@ -71,17 +71,50 @@ class Policy:
         """Read a policy.
 
         Raises:
-            ValueError: if it was made for another observation, naming what differs.
+            ValueError: if it was trained for spaces or environments that there are no more, naming what differs.
         """
-        with np.load(path, allow_pickle=False) as stored:
-            card = json.loads(str(stored["card"]))
-            layers = [(stored[f"W{i}"], stored[f"b{i}"]) for i in range(sum(name.startswith("W") for name in stored))]
-        features = [name for name, _ in FEATURES]
-        if card["features"] != features:
-            changed = sorted(set(card["features"]) ^ set(features)) or "their order"
-            raise ValueError(f"{path} was trained on other observations; what differs: {changed}")
-        shape = card.pop("shape")
-        return cls(layers, shape["hidden"], shape["squashed"], shape["low"], shape["high"], card)
+        try:
+            with np.load(path, allow_pickle=False) as stored:
+                card = json.loads(str(stored["card"]))
+                count = sum(name.startswith("W") for name in stored)
+                layers = [(stored[f"W{i}"], stored[f"b{i}"]) for i in range(count)]
+            shape = card.pop("shape")
+            policy = cls(layers, shape["hidden"], shape["squashed"], card)
+            trained_for = card["task"], card["features"], card["history"], card["environments"]
+        except (KeyError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+            raise ValueError(f"{path} is no policy of agents.train: {error!r}") from None
+        _check(path, *trained_for)
+        return policy
+
+
+def fold(layers: list[Layer], mean: np.ndarray, std: np.ndarray) -> list[Layer]:
+    """Layers that do what the given ones do to normalised input, to the input as it is.
+
+    ``W (x - mean) / std + b = (W / std) x + b - (W / std) mean``.
+    """
+    weights = layers[0][0] / std
+    return [(weights, layers[0][1] - weights @ mean), *layers[1:]]
+
+
+def _check(path: Path, task: str, features: list[str], history: int, ids: list[str]) -> None:
+    """Compare what a policy was trained for with what there is.
+
+    Raises:
+        ValueError: if its spaces or the versions of its environments differ.
+    """
+    if task not in FEATURES_OF:
+        raise ValueError(f"{path} was trained for the task {task!r}; known are {', '.join(FEATURES_OF)}")
+    known = [name for name, _ in FEATURES_OF[task]]
+    if features != known:
+        changed = sorted(set(features) ^ set(known)) or "their order"
+        raise ValueError(f"{path} was trained on other observations; what differs: {changed}")
+    if history != HISTORY:
+        raise ValueError(f"{path} was trained on a history of {history} observations; now it has {HISTORY}")
+    for id in ids:
+        if id not in ENVIRONMENTS:
+            name = id.rsplit("-v", 1)[0]
+            now = [other for other in ENVIRONMENTS if other.rsplit("-v", 1)[0] == name] or list(ENVIRONMENTS)
+            raise ValueError(f"{path} was trained in {id}, which is not registered; there is {', '.join(now)}")
 
 
 class LearnedDriver:
@@ -90,16 +123,48 @@ class LearnedDriver:
     Args:
         policy: of the task ``driver``.
         limits: of the commands.
+
+    Raises:
+        ValueError: if the policy was trained for another task.
     """
 
     def __init__(self, policy: Policy, limits: Limits | None = None) -> None:
-        self._policy, self._history = policy, History(len(FEATURES))
+        _require(policy, "driver")
+        self._policy, self._history = policy, History(1, len(DRIVER_FEATURES))
         self._limits = np.array(limits or Limits())
 
     def reset(self, seed: int | None = None) -> None:
         """Begin an episode; the policy draws nothing."""
-        self._history.reset()
+        self._history.forget()
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired acceleration and steering, shape (2,)."""
-        return self._policy.act(self._history.push(observation)) * self._limits
+        return self._policy.act(self._history.push(driver_view(observation, scene["felt"])[None]))[0] * self._limits
+
+
+class LearnedAllocator:
+    """A trained policy as an :class:`~shared_control_env.controllers.allocators.Allocator`.
+
+    Args:
+        policy: of the task ``allocator``.
+
+    Raises:
+        ValueError: if the policy was trained for another task.
+    """
+
+    def __init__(self, policy: Policy) -> None:
+        _require(policy, "allocator")
+        self._policy, self._history = policy, History(1, len(ALLOCATOR_FEATURES))
+
+    def reset(self, seed: int | None = None) -> None:
+        """Begin an episode; the policy draws nothing."""
+        self._history.forget()
+
+    def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
+        """alpha_a of one step."""
+        return float(authority(self._policy.act(self._history.push(allocator_view(scene, signals)[None])))[0, 0])
+
+
+def _require(policy: Policy, task: str) -> None:
+    if policy.card["task"] != task:
+        raise ValueError(f"the policy was trained for the task {policy.card['task']!r}, not {task!r}")

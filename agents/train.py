@@ -8,8 +8,10 @@ same policy as one that was not.
 from __future__ import annotations
 
 import json
+import shutil
 import time
-import tomllib
+from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,70 +21,64 @@ import torch
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import set_random_seed
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize, unwrap_vec_wrapper
 
 from agents.export import export
 from agents.history import HISTORY
-from agents.tasks import HELD_OUT_SEED, TASKS, make_environment
-from shared_control_env.core.observation import FEATURES
+from agents.hyperparameters import hyperparameters
+from agents.model_driver import ALGORITHMS
+from agents.policy import Policy
+from agents.tasks import TASKS, VALIDATION_SEED, training_config
+from agents.vec_envs import Timed, make_environment
+from agents.views import FEATURES_OF
 from shared_control_env.evaluation.catalogue import choose
 from shared_control_env.evaluation.episodes import versions
 from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.registration import ENVIRONMENTS
 
-ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
-"""Algorithms by name."""
+VALIDATION_EPISODES = 128
+"""Episodes, of seeds that training does not use, by which the best policy is chosen."""
 
-EVALUATION_EPISODES = 64
-"""Episodes with held-out seeds by which the best policy is chosen."""
+EPSILON = 1e-6
+"""Variance added to that of every entry of what a policy sees; the least of them is twice as large."""
 
 PROGRESS = "progress.json"
 """What is done so far, beside the checkpoint."""
 
+BEST = "best.npz"
+"""The best policy so far; its card is beside it as JSON."""
 
-def hyperparameters(algorithm: str, id: str) -> dict[str, Any]:
-    """Hyperparameters of an algorithm, with those of the environment where it has its own."""
-    tables = tomllib.loads((Path(__file__).parent / "hyperparameters.toml").read_text())
-    return {**tables[algorithm], **tables.get(f"{algorithm}:{id}", {})}
+TENSORBOARD = "tensorboard"
+"""Folder of the log."""
 
 
-class Steps(BaseCallback):
-    """Tell the progress bar of every step, and measure how long the environment takes.
+class Advance(BaseCallback):
+    """Tell the progress bar of every step.
 
     Args:
-        env: whose ``step_wait`` is timed.
         advance: called with the number of steps.
     """
 
-    def __init__(self, env: VecEnv, advance: Any) -> None:
+    def __init__(self, advance: Callable[[int], None]) -> None:
         super().__init__()
-        self._advance, self.in_environment = advance, 0.0
-        step_wait = env.step_wait
-
-        def timed() -> Any:
-            begin = time.perf_counter()
-            result = step_wait()
-            self.in_environment += time.perf_counter() - begin
-            return result
-
-        env.step_wait = timed  # type: ignore[method-assign]
+        self._advance = advance
 
     def _on_step(self) -> bool:
         self._advance(self.training_env.num_envs)
         return True
 
 
-def score(model: BaseAlgorithm, id: str, task: str) -> float:
-    """Mean return of the deterministic policy over episodes with held-out seeds."""
-    env = make_environment(id, task, EVALUATION_EPISODES, HELD_OUT_SEED)
+def validate(policy: Policy, ids: Sequence[str], task: str) -> float:
+    """Mean return over episodes with seeds kept for that."""
+    episodes = VALIDATION_EPISODES - VALIDATION_EPISODES % len(ids)
+    env = make_environment(ids, task, episodes, VALIDATION_SEED)
     observations: Any = env.reset()
-    returns, running = np.zeros(EVALUATION_EPISODES), np.ones(EVALUATION_EPISODES, dtype=bool)
+    returns, running = np.zeros(episodes), np.ones(episodes, dtype=bool)
     while running.any():
-        actions, _ = model.predict(observations, deterministic=True)
-        observations, rewards, dones, _ = env.step(actions)
+        observations, rewards, dones, _ = env.step(policy.act(observations))
         returns += rewards * running
         running &= ~dones
     env.close()
@@ -95,33 +91,35 @@ class Training:
     Args:
         folder: of the checkpoint, the best policy and the log.
         algorithm: key of :data:`ALGORITHMS`.
-        id: of the environment.
-        task: one of :data:`agents.tasks.TASKS`.
+        ids: of the environments.
+        task: key of :data:`agents.tasks.TASKS`.
         seed: of everything.
 
     Raises:
         ValueError: if the folder holds a training of something else.
     """
 
-    def __init__(self, folder: Path, algorithm: str, id: str, task: str, seed: int) -> None:
-        self.folder, self.algorithm, self.id, self.task, self.seed = folder, algorithm, id, task, seed
-        self.parameters = hyperparameters(algorithm, id)
+    def __init__(self, folder: Path, algorithm: str, ids: Sequence[str], task: str, seed: int) -> None:
+        self.folder, self.algorithm, self.ids, self.task, self.seed = folder, algorithm, list(ids), task, seed
+        self.parameters = hyperparameters(algorithm, ids)
         self.card: dict[str, Any] = {
             "algorithm": algorithm,
-            "environment": id,
+            "environments": self.ids,
             "task": task,
             "seed": seed,
             "history": HISTORY,
             "hyperparameters": dict(self.parameters),
-            "features": [name for name, _ in FEATURES],
-            "versions": versions(),
+            "config": {id: training_config(id, task) for id in ids},
+            "features": [name for name, _ in FEATURES_OF[task]],
+            "versions": f"{versions()}, stable-baselines3 {version('stable-baselines3')}, torch {version('torch')}",
         }
         self.environments, self.segment = self.parameters.pop("environments"), self.parameters.pop("segment")
+        self.half_life = self.parameters.pop("half_life")
         self.state: dict[str, Any] = {"card": self.card, "steps": 0, "scores": []}
         self.state |= {"seconds": 0.0, "in_environment": 0.0}
         if (folder / PROGRESS).is_file():
             self.state = json.loads((folder / PROGRESS).read_text())
-            for name, wanted in self.card.items():
+            for name, wanted in json.loads(json.dumps(self.card)).items():
                 if self.state["card"].get(name) != wanted:
                     raise ValueError(
                         f"{folder} holds a training with {name} = {self.state['card'].get(name)!r}, not {wanted!r}; "
@@ -130,58 +128,90 @@ class Training:
         elif folder.exists() and any(folder.iterdir()):
             raise ValueError(f"{folder} holds files that are no training; choose another --out")
 
-    @property
-    def checkpoint(self) -> Path:
-        """The model after the last whole segment."""
-        return self.folder / f"checkpoint-{self.state['steps']}.zip"
+    def _kept(self, suffix: str) -> Path:
+        """A file of the state after the last whole segment."""
+        return self.folder / f"checkpoint-{self.state['steps']}{suffix}"
 
-    def run_segment(self, advance: Any) -> None:
+    def run_segment(self, advance: Callable[[int], None]) -> None:
         """Learn one segment, and keep checkpoint, score and, if it is the best, the policy."""
         (word,) = np.random.SeedSequence([self.seed, self.state["steps"]]).generate_state(1)
-        segment_seed = int(word) % (HELD_OUT_SEED - self.environments)
-        env = make_environment(self.id, self.task, self.environments, segment_seed)
-        steps = Steps(env.venv.venv, advance)  # type: ignore[attr-defined]
+        segment_seed = int(word) % (VALIDATION_SEED - self.environments)
+        self._begin()
+        bare = make_environment(self.ids, self.task, self.environments, segment_seed)
+        timed: Any = unwrap_vec_wrapper(bare, Timed)
+        env = self._normalised(bare)
         model = self._model(env)
         torch.set_num_threads(1)  # the networks are small: more threads wait for one another
         set_random_seed(segment_seed)
+        env.seed(segment_seed)  # making or loading the model has seeded them with the model's own seed
         begin = time.perf_counter()
-        model.learn(self.segment, callback=steps, reset_num_timesteps=self.state["steps"] == 0)
+        model.learn(
+            self.segment,
+            callback=Advance(advance),
+            tb_log_name="training",
+            reset_num_timesteps=self.state["steps"] == 0,
+        )
         self.state["seconds"] += time.perf_counter() - begin
-        self.state["in_environment"] += steps.in_environment
+        self.state["in_environment"] += timed.seconds
         env.close()
-        self._keep(model)
+        self._keep(model, env)
+
+    def _begin(self) -> None:
+        """Mark the folder as a training's before its first segment is done, and drop the log of one that was not."""
+        if self.state["steps"] == 0:
+            shutil.rmtree(self.folder / TENSORBOARD, ignore_errors=True)
+            self._note_progress()
+
+    def _note_progress(self) -> None:
+        write_atomically(self.folder / PROGRESS, lambda draft: draft.write_text(json.dumps(self.state, indent=1)))
+
+    def _normalised(self, env: VecEnv) -> VecNormalize:
+        """Observations by their running mean and standard deviation, those of the checkpoint to begin with."""
+        if self.state["steps"] == 0:
+            # The epsilon keeps an entry that never changes, such as a straight road's curvature, from being blown up.
+            return VecNormalize(env, norm_reward=False, clip_obs=np.inf, epsilon=EPSILON)
+        return VecNormalize.load(str(self._kept("-normalisation.pkl")), env)
 
     def _model(self, env: VecEnv) -> BaseAlgorithm:
         """A new model, or that of the checkpoint."""
         cls: Any = ALGORITHMS[self.algorithm]
+        log = str(self.folder / TENSORBOARD)
+        rate = self.parameters["learning_rate"] * 0.5 ** (self.state["steps"] / self.half_life)
         if self.state["steps"] == 0:
-            return cls("MlpPolicy", env, seed=self.seed, device="cpu", **self.parameters)
-        model = cls.load(self.checkpoint, env=env, device="cpu")
-        buffer = self.checkpoint.with_suffix(".pkl")
-        if buffer.is_file():
-            model.load_replay_buffer(buffer)
+            return cls("MlpPolicy", env, seed=self.seed, device="cpu", tensorboard_log=log, **self.parameters)
+        changed = {"learning_rate": rate, "tensorboard_log": log}
+        model = cls.load(self._kept(".zip"), env=env, device="cpu", custom_objects=changed)
+        if self._kept("-replay.pkl").is_file():
+            model.load_replay_buffer(self._kept("-replay.pkl"))
         return model
 
-    def _keep(self, model: Any) -> None:
+    def _keep(self, model: Any, normalisation: VecNormalize) -> None:
         """Write what a segment gave; the progress last, so that a kill leaves the state before."""
-        before, reached = self.checkpoint, score(model, self.id, self.task)
+        before = set(self.folder.glob("checkpoint-*"))
+        policy = export(model, normalisation, {**self.card, "steps": model.num_timesteps})
+        policy.card["score"] = reached = validate(policy, self.ids, self.task)
+        model.logger.record("validation/mean_return", reached)
+        model.logger.dump(model.num_timesteps)
         self.state["steps"] = model.num_timesteps
         self.state["scores"].append([model.num_timesteps, reached])
-        write_atomically(self.checkpoint, model.save)
+        write_atomically(self._kept(".zip"), model.save)
+        write_atomically(self._kept("-normalisation.pkl"), lambda draft: normalisation.save(str(draft)))
         if hasattr(model, "replay_buffer"):
-            write_atomically(self.checkpoint.with_suffix(".pkl"), model.save_replay_buffer)
+            write_atomically(self._kept("-replay.pkl"), model.save_replay_buffer)
         if reached >= max(value for _, value in self.state["scores"]):
-            card = {**self.card, "steps": model.num_timesteps, "score": reached}
-            policy = export(model, card)
-            write_atomically(self.folder / "best.npz", policy.save)
-        write_atomically(self.folder / PROGRESS, lambda draft: draft.write_text(json.dumps(self.state, indent=1)))
-        for path in (before, before.with_suffix(".pkl")):
-            if path != self.checkpoint:
-                path.unlink(missing_ok=True)
+            write_atomically(self.folder / BEST, policy.save)
+            card = {**policy.card, "specs": [json.loads(gym.spec(id).to_json()) for id in self.ids]}
+            text = json.dumps(card, indent=1)
+            write_atomically((self.folder / BEST).with_suffix(".json"), lambda draft: draft.write_text(text))
+        self._note_progress()
+        for path in before - set(self.folder.glob(f"checkpoint-{self.state['steps']}*")):
+            path.unlink(missing_ok=True)
 
 
 def main(
-    env: Annotated[str, typer.Option(help="Id of the environment.")] = "SharedControl/LaneKeeping-v0",
+    env: Annotated[
+        str, typer.Option(help="Ids of environments, separated by commas.")
+    ] = "SharedControl/LaneKeeping-v0",
     algo: Annotated[str, typer.Option(help=f"One of: {', '.join(ALGORITHMS)}.")] = "ppo",
     task: Annotated[str, typer.Option(help=f"One of: {', '.join(TASKS)}.")] = "driver",
     steps: Annotated[int, typer.Option(min=1, help="Steps in all; whole segments are learned.")] = 3_000_000,
@@ -190,25 +220,35 @@ def main(
 ) -> None:
     """Train, or go on with a training that was stopped; the best policy is kept as best.npz."""
     console = Console()
-    folder = out or Path("results/train") / f"{env.split('/')[-1]}-{task}-{algo}-{seed}"
+    ids = [id.strip() for id in env.split(",")]
+    name = "-".join(id.split("/")[-1] for id in ids) if len(ids) < 4 else f"{len(ids)}-environments"
+    folder = out or Path("results/train") / f"{name}-{task}-{algo}-{seed}"
     try:
         choose("algo", algo, ALGORITHMS)
-        choose("task", task, dict.fromkeys(TASKS))
-        choose("env", env, {id: None for id in gym.registry if id.startswith("SharedControl/")})
-        training = Training(folder, algo, env, task, seed)
+        choose("task", task, TASKS)
+        choose("env", ids, ENVIRONMENTS)
+        training = Training(folder, algo, ids, task, seed)
+        run(training, steps, console)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+    except KeyboardInterrupt:
+        console.print(f"Stopped; {training.state['steps']:,} steps are kept in {folder}. The same command goes on.")
+        raise typer.Exit(130) from None
+    share = training.state["in_environment"] / training.state["seconds"]
+    console.print(
+        f"{training.state['steps']:,} steps in {training.state['seconds']:.0f} s, {100.0 * share:.0f} % of it in the "
+        f"environment; the best policy is {folder / BEST}, the log {folder / TENSORBOARD}."
+    )
+
+
+def run(training: Training, steps: int, console: Console) -> None:
+    """Learn segments until there are so many steps, and show it."""
     columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as bar:
         progress = bar.add_task("steps", total=steps, completed=training.state["steps"])
         while training.state["steps"] < steps:
             training.run_segment(lambda n: bar.advance(progress, n))
             console.print(f"{training.state['steps']:,} steps: mean return {training.state['scores'][-1][1]:.1f}")
-    share = training.state["in_environment"] / training.state["seconds"]
-    console.print(
-        f"{training.state['steps']:,} steps in {training.state['seconds']:.0f} s, {100.0 * share:.0f} % of it in the "
-        f"environment; the best policy is {folder / 'best.npz'}."
-    )
 
 
 if __name__ == "__main__":

@@ -1,30 +1,147 @@
-"""The table of trained drivers beside the others."""
+"""The table of trained drivers and allocators beside the others."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the extra 'train'")
 
-from agents.evaluate import COMPARED, LEARNED, METRICS, compared, measure
+from typer.testing import CliRunner
+
+from agents import evaluate, render
+from agents.evaluate import COMPARED, KINDS, LEARNED, METRICS, compare, losses, measure, over_seeds
 from agents.history import HISTORY
 from agents.policy import Policy
 from agents.tasks import HELD_OUT_SEED
+from agents.views import FEATURES_OF
+
+ID = "SharedControl/Bend-v0"
 
 
-def idle_policy(bias):
-    """A policy that always gives the same small command."""
-    layers = [(np.zeros((2, 25 * HISTORY)), np.array([0.0, bias]))]
-    return Policy(layers, "tanh", False, -1.0, 1.0, {})
+@pytest.fixture
+def idle(tmp_path):
+    """Files of policies that always give the same small action."""
+
+    def make(task, biases):
+        paths = []
+        for i, bias in enumerate(biases):
+            features = [name for name, _ in FEATURES_OF[task]]
+            actions = np.array([0.0, bias] if task == "driver" else [bias])
+            card = {"task": task, "features": features, "history": HISTORY, "environments": [ID]}
+            policy = Policy([(np.zeros((len(actions), len(features) * HISTORY)), actions)], "tanh", False, card)
+            paths.append(tmp_path / f"{task}-{i}.npz")
+            policy.save(paths[-1])
+        return [str(path) for path in paths]
+
+    return make
 
 
-def test_table():
-    table = measure([idle_policy(0.0), idle_policy(0.02)], ("bend",), 2)
+@pytest.mark.parametrize(("task", "baseline"), [("driver", "mpc"), ("allocator", "proportional")])
+def test_table(idle, task, baseline):
+    table = measure(task, idle(task, (0.0, 0.02)), ("bend",), 2)
     assert table["seed"].min() >= HELD_OUT_SEED
-    assert set(table["kind"]) == {"left out of training", "seen in training"}
-    values = compared(table)
-    assert {driver for _, driver in values} == {LEARNED, *COMPARED}
-    for (kind, driver), row in values.items():
-        part = table[(table["kind"] == kind) & table["driver"].str.startswith(driver)]
+    rows = compare(table, task)
+    names = [LEARNED, *COMPARED[task], f"{LEARNED} - {baseline}"]
+    assert [(row.kind, row.name) for row in rows] == [(kind, name) for kind in KINDS for name in names]
+    for row in rows:
+        if " - " in row.name:
+            continue
+        part = table[(table["kind"] == row.kind) & table["name"].str.startswith(row.name)]
         for name in METRICS:
-            assert row[name].estimate == pytest.approx(part[name].mean())
-        assert row["lateral_rms"].n == (2 if driver == LEARNED else len(part))
+            assert row.values[name].estimate == pytest.approx(part[name].mean())
+        assert row.values["lateral_rms"].n == (2 if row.name == LEARNED else len(part))
+    differences = {row.kind: row.values for row in rows if " - " in row.name}
+    both = {row.kind: row.values for row in rows if row.name == baseline}
+    for row in rows:
+        if row.name == LEARNED:
+            for name in METRICS:
+                expected = row.values[name].estimate - both[row.kind][name].estimate
+                assert differences[row.kind][name].estimate == pytest.approx(expected, abs=1e-12)
+
+
+def test_intervals_over_seeds_are_students():
+    values = np.array([1.0, 2.0, 4.0, 3.0, 2.5])
+    found = over_seeds(values)
+    # t of 4 degrees of freedom at 97.5 %: 2.776
+    assert found.high - found.estimate == pytest.approx(2.776 * np.std(values, ddof=1) / np.sqrt(5), rel=1e-3)
+    assert found.estimate == 2.5
+    assert np.isnan(over_seeds(values[:1]).low)
+
+
+def made_up(learned, baseline=0.2):
+    """A table of five training seeds in one scenario under one degradation, the same value for all metrics."""
+    values = {
+        **{f"{LEARNED} {i}": value for i, value in enumerate(learned)},
+        **dict.fromkeys(COMPARED["driver"], baseline),
+    }
+    rows = [
+        {
+            "scenario": "bend",
+            "degradation": "delay",
+            "kind": KINDS[0],
+            "seed": seed,
+            "name": name,
+            **dict.fromkeys(METRICS, v),
+        }
+        for name, v in values.items()
+        for seed in range(4)
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.mark.parametrize(
+    ("learned", "lost"),
+    [((0.3, 0.31, 0.32, 0.3, 0.31), True), ((0.9, 0.1, 0.15, 0.2, 0.18), False), ((0.1, 0.1, 0.11, 0.1, 0.1), False)],
+)
+def test_losses_are_those_that_all_of_the_interval_shows(learned, lost):
+    found = losses(made_up(learned), "driver")
+    assert list(found["metric"]) == (list(METRICS) if lost else [])
+    for _, row in found.iterrows():
+        assert row[LEARNED] == pytest.approx(np.mean(learned))
+
+
+def test_a_difference_is_as_uncertain_as_seeds_and_episodes_are():
+    table = made_up((0.3, 0.3, 0.3, 0.3, 0.3))
+    spread = table["seed"].to_numpy() * (table["name"] == "mpc")  # of the baseline, from episode to episode
+    table["collisions"] += 0.1 * spread - 0.15 * (table["name"] == "mpc")
+    (row,) = [row for row in compare(table, "driver") if row.name == f"{LEARNED} - mpc"]
+    assert row.values["lateral_rms"].low == pytest.approx(0.1)
+    assert row.values["lateral_rms"].high == pytest.approx(0.1)
+    assert row.values["collisions"].estimate == pytest.approx(0.1)
+    assert row.values["collisions"].low < 0.03 < 0.17 < row.values["collisions"].high
+
+
+def test_command(idle):
+    app = evaluate.typer.Typer()
+    app.command()(evaluate.main)
+    result = CliRunner().invoke(app, [*idle("driver", (0.0,)), "--seeds", "1"])
+    assert result.exit_code == 0, result.output
+    assert "of bend" in " ".join(result.output.split())
+    wrong = CliRunner().invoke(app, ["--task", "diver"])
+    assert "driver" in wrong.output
+    assert wrong.exit_code == 2
+
+
+def test_video_side_by_side(idle, tmp_path):
+    (policy,) = idle("driver", (0.0,))
+    app = render.typer.Typer()
+    app.command()(render.main)
+    path = tmp_path / "video.mp4"
+    drivers = f"mpc:proportional,{policy},none:none"
+    arguments = ["--scenario", "bend", "--degradation", "step_bias", "--drivers", drivers, "--out", str(path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert path.stat().st_size > 10_000
+    again = CliRunner().invoke(app, arguments)
+    assert again.exit_code == 2
+    assert "choose another --out" in again.output
+
+
+def test_frames_of_a_drive_that_ended_stay():
+    frame = np.zeros((40, 101, 3), np.uint8)
+    drives = [render.Drive("short", [frame]), render.Drive("long", [frame, frame + 100])]
+    first, last = render.side_by_side(drives)
+    assert first.shape == (2 * (40 + render.TITLE_HEIGHT), 100, 3)
+    assert last[60].max() <= 235
+    np.testing.assert_array_equal(last[render.TITLE_HEIGHT : 60], first[render.TITLE_HEIGHT : 60])
+    assert (last[-10] == 100).all()

@@ -1,0 +1,123 @@
+"""Videos of one episode with several drivers beside one another: ``python -m agents.render``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import pygame
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from agents.drivers import authority_entry, driver_entry
+from shared_control_env.envs.cases import CASES
+from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.evaluation.catalogue import choose
+from shared_control_env.evaluation.replay import record, replay_episode
+
+TITLE_HEIGHT = 28
+"""Of the line over each picture [px]."""
+
+
+class Drive(NamedTuple):
+    """One episode.
+
+    Attributes:
+        title: who drives, under which authority, and how it went.
+        frames: a picture of every step.
+    """
+
+    title: str
+    frames: list[np.ndarray]
+
+
+def drive(scenario: str, degradation: str, seed: int, driver: str, authority: str) -> Drive:
+    """Run one episode.
+
+    Args:
+        scenario: key of :data:`envs.cases.CASES`.
+        degradation: key of :data:`envs.degradations.DEGRADATIONS`.
+        seed: of the episode.
+        driver: as :func:`agents.drivers.driver_entry` takes it.
+        authority: as :func:`agents.drivers.authority_entry` takes it.
+    """
+    frames: list[np.ndarray] = []
+    entries = (driver, driver_entry(driver)), (authority, authority_entry(authority))
+    metrics = replay_episode(scenario, *entries, degradation, seed, frames)
+    limiter = "no limit" if authority == "none" else f"authority {authority}"
+    outcome = "collision, " * bool(metrics["collisions"]) + "off the road, " * bool(metrics["road_departures"])
+    measured = f"lateral RMS {metrics['lateral_rms']:.2f} m, driver's effort {metrics['driver_effort']:.3f}"
+    return Drive(f"driver {driver}, {limiter}: {outcome}{measured}", frames)
+
+
+def side_by_side(drives: Sequence[Drive]) -> list[np.ndarray]:
+    """Frames of all drives at the same time; one that ended shows its last.
+
+    Wide pictures go one under the other, others in a row; bytes of shape (height, width, 3), both even as MP4 needs.
+    """
+    pygame.font.init()
+    font = pygame.font.Font(None, 22)
+    titles = [_title(font, each.title, each.frames[0].shape[1]) for each in drives]
+    height, width, _ = drives[0].frames[0].shape
+    axis = 0 if width > height else 1
+    steps = max(len(each.frames) for each in drives)
+    joined = (
+        np.concatenate(
+            [
+                np.concatenate([title, each.frames[min(k, len(each.frames) - 1)]])
+                for title, each in zip(titles, drives, strict=True)
+            ],
+            axis=axis,
+        )
+        for k in range(steps)
+    )
+    return [frame[: frame.shape[0] // 2 * 2, : frame.shape[1] // 2 * 2] for frame in joined]
+
+
+def _title(font: pygame.font.Font, text: str, width: int) -> np.ndarray:
+    """A line of text as a picture, shape (TITLE_HEIGHT, width, 3)."""
+    surface = pygame.Surface((width, TITLE_HEIGHT))
+    surface.fill((235, 235, 240))
+    surface.blit(font.render(text, True, (20, 20, 20)), (14, 6))
+    return np.moveaxis(pygame.surfarray.array3d(surface), 0, 1)
+
+
+def main(
+    scenario: Annotated[str, typer.Option(help="Name.")] = "lane_keeping",
+    degradation: Annotated[str, typer.Option(help="Name.")] = "delay",
+    seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 1_000_000,
+    drivers: Annotated[str, typer.Option(help="driver:authority, several separated by commas.")] = (
+        "mpc:proportional,driver-0:proportional,mpc:none"
+    ),
+    out: Annotated[Path | None, typer.Option(help="MP4; by default under results/videos.")] = None,
+) -> None:
+    """Write an MP4 of the same episode with the predictive driver, a trained one, and without a limit."""
+    console = Console()
+    path = out or Path("results/videos") / f"{scenario}-{degradation}-{seed}.mp4"
+    if path.suffix != ".mp4":
+        raise typer.BadParameter(f"out = {path} must end with .mp4")
+    if path.exists():
+        raise typer.BadParameter(f"{path} exists already; choose another --out")
+    pairs = [pair.strip().partition(":") for pair in drivers.split(",")]
+    try:
+        choose("scenario", scenario, CASES)
+        choose("degradation", degradation, DEGRADATIONS)
+        drives = []
+        columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn())
+        with Progress(*columns, console=console) as bar:
+            running = bar.add_task("episodes", total=len(pairs))
+            for driver, _, authority in pairs:
+                drives.append(drive(scenario, degradation, seed, driver, authority or "proportional"))
+                console.print(drives[-1].title)
+                bar.advance(running)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+    record(side_by_side(drives), path)
+    console.print(f"The video is {path}.")
+
+
+if __name__ == "__main__":
+    typer.run(main)

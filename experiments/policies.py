@@ -1,0 +1,185 @@
+"""Train the policies that ship, compare them on what training left out, and write their model card.
+
+``python -m experiments.policies`` trains five seeds of a driver and of an allocator, goes on where it was stopped, and
+replaces ``agents/policies``: the policies, their curves, and the card in README.md with the numbers of this run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from concurrent.futures import ProcessPoolExecutor, wait
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+import typer
+from jinja2 import Template
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from agents.drivers import POLICIES
+from agents.evaluate import BASELINE, KINDS, LEARNED, METRICS, Row, compare, measure, shown, where_it_loses
+from agents.tasks import HELD_OUT_DEGRADATIONS, TASKS
+from agents.train import BEST, PROGRESS, Training
+from experiments import style
+from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.registration import ENVIRONMENTS
+
+SEEDS = range(5)
+"""Training seeds of each task."""
+
+DRAWN = [id for id, scenario in ENVIRONMENTS.items() if scenario not in ("two_lane", "curve")]
+"""Environments that are drawn; the policies are compared in them."""
+
+IDS = [*DRAWN, "SharedControl/LeadBraking-v0", "SharedControl/LeadBraking-v0"]
+"""Environments of training: three shares for the one in which a driver who does not brake hard enough collides."""
+
+STEPS = {"driver": 6_400_000, "allocator": 2_400_000}
+"""Steps of each training; whole segments are learned."""
+
+FOLDER = Path("results/policies")
+"""Of the trainings."""
+
+
+def folder_of(task: str, seed: int) -> Path:
+    """Of one training."""
+    return FOLDER / f"{task}-{seed}"
+
+
+def state_of(task: str, seed: int) -> dict[str, Any]:
+    """How far one training is; what it reached."""
+    path = folder_of(task, seed) / PROGRESS
+    return json.loads(path.read_text()) if path.is_file() else {"steps": 0}
+
+
+def train(task: str, seed: int, steps: int) -> None:
+    """Train one policy to the end."""
+    training = Training(folder_of(task, seed), "ppo", IDS, task, seed)
+    while training.state["steps"] < steps:
+        training.run_segment(lambda _: None)
+
+
+def train_all(jobs: int, console: Console) -> None:
+    """Train all policies, several at once."""
+    runs = [(task, seed) for task in TASKS for seed in SEEDS]
+    columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as bar, ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        progress = bar.add_task("steps", total=sum(STEPS[task] for task, _ in runs))
+        waiting = {pool.submit(train, task, seed, STEPS[task]) for task, seed in runs}
+        while waiting:
+            done, waiting = wait(waiting, timeout=2.0)
+            for future in done:
+                future.result()
+            bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
+
+
+def draw_curves(path: Path) -> None:
+    """Validation return of every seed over the steps, a panel a task."""
+    with style.figure(path, 1, len(TASKS), (9.0, 3.2)) as (_, axes):
+        for axis, task in zip(axes[0], TASKS, strict=True):
+            for seed in SEEDS:
+                steps, scores = np.array(state_of(task, seed)["scores"]).T
+                axis.plot(steps / 1e6, scores, label=f"seed {seed}")
+            axis.set(title=task, xlabel="steps [million]", ylabel="mean return, validation episodes")
+        axes[0, 0].legend()
+
+
+def as_markdown(rows: list[Row]) -> list[str]:
+    """The comparison."""
+    head = ["faults", "name", *(name.replace("_", " ") for name in METRICS)]
+    lines = [head, ["---"] * len(head)]
+    lines += [[row.kind, row.name, *(shown(value) for value in row.values.values())] for row in rows]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def verdict(rows: list[Row], task: str) -> list[str]:
+    """What the differences from the baseline say, metric by metric, in words."""
+    lines = []
+    for kind in KINDS:
+        (differences,) = [
+            row.values for row in rows if row.kind == kind and row.name == f"{LEARNED} - {BASELINE[task]}"
+        ]
+        named: dict[str, list[str]] = {"less": [], "more": [], "not told apart": []}
+        for metric, value in differences.items():
+            how = "less" if value.high < 0.0 else "more" if value.low > 0.0 else "not told apart"
+            named[how].append(metric.replace("_", " "))
+        said = "; ".join(f"{how}: {', '.join(names)}" for how, names in named.items() if names)
+        lines.append(f"- Faults {kind}, {LEARNED} against `{BASELINE[task]}`: {said}.")
+    return lines
+
+
+def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
+    """What the card says of one task."""
+    states = [state_of(task, seed) for seed in SEEDS]
+    seconds = [state["seconds"] for state in states]
+    rows = compare(table, task)
+    return {
+        "task": task,
+        "description": TASKS[task].description,
+        "reward": ", ".join(f"{name} {value:g}" for name, value in TASKS[task].reward._asdict().items()),
+        "asked": STEPS[task],
+        "steps": f"{states[0]['steps']:,}",
+        "fastest": round(min(seconds)),
+        "slowest": round(max(seconds)),
+        "share": round(100.0 * sum(state["in_environment"] for state in states) / sum(seconds)),
+        "episodes": f"{len(table):,}",
+        "table": "\n".join(as_markdown(rows)),
+        "verdict": "\n".join(verdict(rows, task)),
+        "baseline": BASELINE[task],
+        "cells": len(table[["scenario", "degradation"]].drop_duplicates()),
+        "losses": "\n".join(where_it_loses(table, task)),
+    }
+
+
+def card(tables: dict[str, pd.DataFrame], jobs: int) -> str:
+    """The model card."""
+    template = Template(Path(__file__).with_suffix(".md.j2").read_text(), keep_trailing_newline=True)
+    versions = state_of("driver", 0)["card"]["versions"]
+    return template.render(
+        ids=IDS,
+        seeds=list(SEEDS),
+        versions=versions,
+        jobs=jobs,
+        cores=os.cpu_count(),
+        held_out=[f"`{kind}`" for kind in HELD_OUT_DEGRADATIONS],
+        seeds_compared=tables["driver"]["seed"].nunique(),
+        parts=[part_of_card(task, table) for task, table in tables.items()],
+    )
+
+
+def publish(seeds: int, jobs: int, console: Console) -> None:
+    """Compare the trained policies, and replace those that ship with their card."""
+    tables = {}
+    for task in TASKS:
+        sources = [str(folder_of(task, seed) / BEST) for seed in SEEDS]
+        columns = (TextColumn(f"episodes, {task}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        with Progress(*columns, console=console) as bar:
+            running = bar.add_task("episodes", total=None)
+            update = lambda done, total, bar=bar, running=running: bar.update(running, completed=done, total=total)
+            tables[task] = measure(task, sources, [ENVIRONMENTS[id] for id in DRAWN], seeds, jobs, update)
+        write_atomically(FOLDER / f"{task}.parquet", tables[task].to_parquet)
+    POLICIES.mkdir(exist_ok=True)
+    for task in TASKS:
+        for seed in SEEDS:
+            shutil.copyfile(folder_of(task, seed) / BEST, POLICIES / f"{task}-{seed}.npz")
+    draw_curves(POLICIES / "curves.png")
+    write_atomically(POLICIES / "README.md", lambda draft: draft.write_text(card(tables, jobs)))
+    console.print(f"The policies and their card are in {POLICIES}.")
+
+
+def main(
+    seeds: Annotated[int, typer.Option(min=1, help="Held-out seeds of the comparison.")] = 5,
+    jobs: Annotated[int, typer.Option(min=1, help="Trainings at once.")] = os.cpu_count() or 1,
+) -> None:
+    """Train, compare, and replace what ships; stopped, it goes on where it was."""
+    console = Console()
+    train_all(jobs, console)
+    publish(seeds, jobs, console)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -8,8 +8,6 @@ knows what the automation is about to do.
 
 from __future__ import annotations
 
-from math import pi
-
 import numpy as np
 
 from shared_control_env.core.observation import FEATURES
@@ -26,13 +24,7 @@ DRIVER_FEATURES: tuple[tuple[str, float], ...] = (
 """Name and scale of every entry: the environment's observation, and what is felt."""
 
 ALLOCATOR_FEATURES: tuple[tuple[str, float], ...] = (
-    ("lateral error y - y_target [m]", 4.0),
-    ("heading relative to the road [rad]", pi / 4),
-    ("longitudinal speed v_x [m/s]", 40.0),
-    ("lateral speed v_y [m/s]", 5.0),
-    ("yaw rate r [rad/s]", 1.0),
-    ("speed error v_x - v_target [m/s]", 20.0),
-    ("curvature at the ego [1/m]", 0.05),
+    *FEATURES[:7],  # the ego's motion, and the curvature where it is
     ("automation's last actual acceleration [m/s^2]", _LIMITS.a_max),
     ("automation's last actual steering [rad]", _LIMITS.delta_max),
     ("automation's degraded acceleration u_a,f [m/s^2]", _LIMITS.a_max),
@@ -40,16 +32,7 @@ ALLOCATOR_FEATURES: tuple[tuple[str, float], ...] = (
     ("predicted lateral error [m]", 4.0),
     ("longitudinal risk r_x [-]", 1.0),
     ("lateral risk r_y [-]", 1.0),
-    *(
-        (f"{name} {feature}", scale)
-        for name in ("follower", "leader", "preceding")
-        for feature, scale in (
-            ("present [-]", 1.0),
-            ("distance along the road [m]", 100.0),
-            ("distance across the road [m]", 8.0),
-            ("speed minus the ego's [m/s]", 20.0),
-        )
-    ),
+    *FEATURES[10:22],  # the follower, the leader and the preceding vehicle
 )
 """Name and scale of every entry: the entry is the feature divided by its scale, clipped to [-1, 1]."""
 

@@ -199,6 +199,13 @@ def test_the_best_is_marked(page):
     assert row.find_element("tag name", "th").text == "paper, mpc"
 
 
+def wait_until_copied(page, button):
+    """The clipboard answers after the click has returned."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    WebDriverWait(page, 10).until(lambda _: button.text == "copied")
+
+
 def test_failures_have_their_command(page):
     commands = [code.text for code in page.find_elements("css selector", "td code")]
     assert (
@@ -207,7 +214,7 @@ def test_failures_have_their_command(page):
     button = page.find_element("css selector", ".copy")
     page.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
     button.click()
-    assert button.text == "copied"
+    wait_until_copied(page, button)
 
 
 def test_the_command_that_is_copied_is_the_one_shown(page):
@@ -218,6 +225,7 @@ def test_the_command_that_is_copied_is_the_one_shown(page):
     page.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
     button.click()
     row = button.find_element("xpath", "ancestor::tr")
+    wait_until_copied(page, button)
     assert page.execute_script("return window.copied") == row.find_element("tag name", "code").text
 
 

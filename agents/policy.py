@@ -10,10 +10,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from agents.history import HISTORY, History
-from agents.views import ALLOCATOR_FEATURES, DRIVER_FEATURES, FEATURES_OF, allocator_view, authority, driver_view
+from agents.card import check_card
+from agents.history import History
+from agents.views import ALLOCATOR_FEATURES, DRIVER_FEATURES, allocator_view, authority, command, driver_view
 from shared_control_env.core.parameters import Limits
-from shared_control_env.registration import ENVIRONMENTS
 
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "tanh": np.tanh,
@@ -33,7 +33,7 @@ class Policy:
         layers: all of them, the input's first.
         hidden: name in :data:`ACTIVATIONS`.
         squashed: whether the output goes through a tanh into the bounds; else it is clipped to them.
-        card: what it was trained as: algorithm, environment, task, config, seed, versions.
+        card: what it was trained as, see :mod:`agents.card`.
     """
 
     def __init__(
@@ -80,10 +80,9 @@ class Policy:
                 layers = [(stored[f"W{i}"], stored[f"b{i}"]) for i in range(count)]
             shape = card.pop("shape")
             policy = cls(layers, shape["hidden"], shape["squashed"], card)
-            trained_for = card["task"], card["features"], card["history"], card["environments"]
         except (KeyError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
             raise ValueError(f"{path} is no policy of agents.train: {error!r}") from None
-        _check(path, *trained_for)
+        check_card(path, card)
         return policy
 
 
@@ -94,27 +93,6 @@ def fold(layers: list[Layer], mean: np.ndarray, std: np.ndarray) -> list[Layer]:
     """
     weights = layers[0][0] / std
     return [(weights, layers[0][1] - weights @ mean), *layers[1:]]
-
-
-def _check(path: Path, task: str, features: list[str], history: int, ids: list[str]) -> None:
-    """Compare what a policy was trained for with what there is.
-
-    Raises:
-        ValueError: if its spaces or the versions of its environments differ.
-    """
-    if task not in FEATURES_OF:
-        raise ValueError(f"{path} was trained for the task {task!r}; known are {', '.join(FEATURES_OF)}")
-    known = [name for name, _ in FEATURES_OF[task]]
-    if features != known:
-        changed = sorted(set(features) ^ set(known)) or "their order"
-        raise ValueError(f"{path} was trained on other observations; what differs: {changed}")
-    if history != HISTORY:
-        raise ValueError(f"{path} was trained on a history of {history} observations; now it has {HISTORY}")
-    for id in ids:
-        if id not in ENVIRONMENTS:
-            name = id.rsplit("-v", 1)[0]
-            now = [other for other in ENVIRONMENTS if other.rsplit("-v", 1)[0] == name] or list(ENVIRONMENTS)
-            raise ValueError(f"{path} was trained in {id}, which is not registered; there is {', '.join(now)}")
 
 
 class LearnedDriver:
@@ -139,7 +117,8 @@ class LearnedDriver:
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired acceleration and steering, shape (2,)."""
-        return self._policy.act(self._history.push(driver_view(observation, scene["felt"])[None]))[0] * self._limits
+        seen = self._history.push(driver_view(observation, scene["felt"])[None])
+        return command(self._policy.act(seen))[0] * self._limits
 
 
 class LearnedAllocator:

@@ -6,7 +6,6 @@ policy that comes out is of the same kind, and :mod:`agents.evaluate` compares i
 
 from __future__ import annotations
 
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -26,13 +25,13 @@ from ray.tune.registry import register_env
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from agents.card import card_of
 from agents.history import HISTORY, History
 from agents.hyperparameters import hyperparameters
 from agents.policy import Policy, fold
 from agents.tasks import TASKS, VALIDATION_SEED, training_config
-from agents.views import FEATURES_OF, allocator_view, authority, driver_view
+from agents.views import ACTION_OF, FEATURES_OF, view
 from shared_control_env.evaluation.catalogue import choose
-from shared_control_env.evaluation.episodes import versions
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
 
@@ -83,23 +82,17 @@ class TaskVectorEnv(VectorWrapper):
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Step all environments; those that ended begin anew."""
-        taken = authority(actions) if self._task == "allocator" else actions
-        observations, rewards, terminations, truncations, _ = self.env.step(taken)
+        observations, rewards, terminations, truncations, _ = self.env.step(ACTION_OF[self._task](actions))
         seen = self._seen(observations)
         self._ended = terminations | truncations
         return seen, rewards, terminations, truncations, {}
 
     def _seen(self, observations: np.ndarray) -> np.ndarray:
         kernel: Any = self.env.unwrapped
-        driver = self._task == "driver"
-        view = (
-            driver_view(observations, kernel.scenes["felt"])
-            if driver
-            else allocator_view(kernel.scenes, kernel.signals)
-        )
+        viewed = view(self._task, observations, kernel.scenes, kernel.signals)
         self._history.forget(self._ended)
         self._ended = np.zeros_like(self._ended)
-        return ((self._history.push(view) - self._normalisation.mean) / self._normalisation.std).astype(np.float32)
+        return ((self._history.push(viewed) - self._normalisation.mean) / self._normalisation.std).astype(np.float32)
 
 
 class TrainingSeeds(VectorWrapper):
@@ -240,21 +233,6 @@ def connect(address: str) -> None:
         ray.init(address=address, runtime_env={"working_dir": root, "excludes": EXCLUDED})
 
 
-def card_of(id: str, task: str, seed: int) -> dict[str, Any]:
-    """What a policy was trained as."""
-    return {
-        "algorithm": "ppo on RLlib",
-        "environments": [id],
-        "task": task,
-        "seed": seed,
-        "history": HISTORY,
-        "hyperparameters": HYPERPARAMETERS,
-        "config": {id: training_config(id, task)},
-        "features": [name for name, _ in FEATURES_OF[task]],
-        "versions": f"{versions()}, ray {version('ray')}, torch {version('torch')}",
-    }
-
-
 def main(
     env: Annotated[str, typer.Option(help="Id of the environment.")] = "SharedControl/LaneKeeping-v0",
     task: Annotated[str, typer.Option(help=f"One of: {', '.join(TASKS)}.")] = "driver",
@@ -281,6 +259,7 @@ def main(
         raise typer.BadParameter(f"out = {path} must end with .npz")
     if path.exists():
         raise typer.BadParameter(f"{path} exists already; choose another --out")
+    card = card_of("ppo on RLlib", [env], task, seed, HYPERPARAMETERS, ("ray", "torch"))
     connect(address)
     normalisation = measured_normalisation(env, task)
     algorithm = make_algorithm(env, task, seed, normalisation, runners, environments)
@@ -291,7 +270,7 @@ def main(
             result = algorithm.train()
             done = result["env_runners"]["num_env_steps_sampled_lifetime"]
             bar.update(progress, completed=done)
-    policy = export(algorithm, normalisation, {**card_of(env, task, seed), "steps": int(done)})
+    policy = export(algorithm, normalisation, {**card, "steps": int(done)})
     write_atomically(path, policy.save)
     algorithm.stop()
     ray.shutdown()

@@ -9,13 +9,13 @@ from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.registration import ENVIRONMENTS
 
-# An effort of 11 % of the limits counts as much as a lateral error of 0.1 m, or a speed error of 0.2 m/s. Progress
+# An effort of 9 % of the limits counts as much as a lateral error of 0.1 m, or a speed error of 0.2 m/s. Progress
 # counts next to nothing: with more a driver learns to push against an automation that is right to slow down. A
-# failure, discounted by 0.98 a step, outweighs braking hard for as long as it takes.
-_REWARD = RewardParameters(progress=0.01, lane=4.0, speed=0.8, effort=0.9, comfort=0.005, conflict=0.01, failure=300.0)
+# failure, discounted by 0.98 a step, outweighs braking hard for as long as it takes, and a last metre kept for safety.
+_REWARD = RewardParameters(progress=0.01, lane=4.0, speed=0.8, effort=1.3, comfort=0.005, conflict=0.01, failure=800.0)
 
 # The predictive driver leaves the lane more often than it collides, and an allocator can only choose how much it has to
-# do: more for the lane, less for the effort.
+# do: more for the lane, less for the effort, and less for a failure, which is seldom the allocator's doing.
 _ALLOCATOR_REWARD = _REWARD._replace(lane=8.0, effort=0.4, failure=600.0)
 
 
@@ -43,14 +43,15 @@ HELD_OUT_DEGRADATIONS = ("intermittent", "delay", "coloured_noise", "sign_error"
 VALIDATION_SEED = 900_000
 """Training uses seeds below; from here on the best policy is chosen."""
 
-HELD_OUT_SEED = 2_000_000
+HELD_OUT_SEED = 3_000_000
 """From here on policies are compared with others; neither training nor the choice of the best has seen these."""
 
 LAG_RANGES = (
-    {"setting": "driver_lag.K_h", "low": 0.9, "high": 1.25},
-    {"setting": "driver_lag.T_h", "low": 0.12, "high": 0.24},
+    {"setting": "driver_lag.K_h", "low": 0.75, "high": 1.4},
+    {"setting": "driver_lag.T_h", "low": 0.1, "high": 0.32},
 )
-"""The driver's response in training, around the five that the paper identified."""
+"""The driver's response in training, well around the five that the paper identified: one who is not sure of what the
+hands will do keeps a margin."""
 
 
 def training_config(id: str, task: str) -> dict[str, Any]:

@@ -11,7 +11,6 @@ import json
 import shutil
 import time
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -23,24 +22,23 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize, unwrap_vec_wrapper
 
+from agents.card import card_of
 from agents.export import export
-from agents.history import HISTORY
 from agents.hyperparameters import hyperparameters
 from agents.model_driver import ALGORITHMS
 from agents.policy import Policy
-from agents.tasks import TASKS, VALIDATION_SEED, training_config
+from agents.tasks import TASKS, VALIDATION_SEED
 from agents.vec_envs import Timed, make_environment
-from agents.views import FEATURES_OF
 from shared_control_env.evaluation.catalogue import choose
-from shared_control_env.evaluation.episodes import versions
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
 
-VALIDATION_EPISODES = 128
-"""Episodes, of seeds that training does not use, by which the best policy is chosen."""
+VALIDATION_EPISODES = 500
+"""Episodes, of seeds that training does not use, by which the best policy is chosen; failures are rare."""
 
 EPSILON = 1e-6
 """Variance added to that of every entry of what a policy sees; the least of them is twice as large."""
@@ -102,17 +100,8 @@ class Training:
     def __init__(self, folder: Path, algorithm: str, ids: Sequence[str], task: str, seed: int) -> None:
         self.folder, self.algorithm, self.ids, self.task, self.seed = folder, algorithm, list(ids), task, seed
         self.parameters = hyperparameters(algorithm, ids)
-        self.card: dict[str, Any] = {
-            "algorithm": algorithm,
-            "environments": self.ids,
-            "task": task,
-            "seed": seed,
-            "history": HISTORY,
-            "hyperparameters": dict(self.parameters),
-            "config": {id: training_config(id, task) for id in ids},
-            "features": [name for name, _ in FEATURES_OF[task]],
-            "versions": f"{versions()}, stable-baselines3 {version('stable-baselines3')}, torch {version('torch')}",
-        }
+        libraries = ("stable-baselines3", "torch")
+        self.card = card_of(algorithm, self.ids, task, seed, self.parameters, libraries)
         self.environments, self.segment = self.parameters.pop("environments"), self.parameters.pop("segment")
         self.half_life = self.parameters.pop("half_life")
         self.state: dict[str, Any] = {"card": self.card, "steps": 0, "scores": []}
@@ -178,7 +167,11 @@ class Training:
         log = str(self.folder / TENSORBOARD)
         rate = self.parameters["learning_rate"] * 0.5 ** (self.state["steps"] / self.half_life)
         if self.state["steps"] == 0:
-            return cls("MlpPolicy", env, seed=self.seed, device="cpu", tensorboard_log=log, **self.parameters)
+            parameters = dict(self.parameters)
+            if "action_noise" in parameters:
+                zeros = np.zeros(env.action_space.shape or ())
+                parameters["action_noise"] = NormalActionNoise(zeros, zeros + parameters["action_noise"])
+            return cls("MlpPolicy", env, seed=self.seed, device="cpu", tensorboard_log=log, **parameters)
         changed = {"learning_rate": rate, "tensorboard_log": log}
         model = cls.load(self._kept(".zip"), env=env, device="cpu", custom_objects=changed)
         if self._kept("-replay.pkl").is_file():
@@ -210,7 +203,7 @@ class Training:
 
 def main(
     env: Annotated[
-        str, typer.Option(help="Ids of environments, separated by commas.")
+        str, typer.Option(help="Ids of environments, separated by commas; one named twice has twice the share.")
     ] = "SharedControl/LaneKeeping-v0",
     algo: Annotated[str, typer.Option(help=f"One of: {', '.join(ALGORITHMS)}.")] = "ppo",
     task: Annotated[str, typer.Option(help=f"One of: {', '.join(TASKS)}.")] = "driver",

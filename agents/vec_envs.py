@@ -1,4 +1,4 @@
-"""Vectorised environments as training takes them: of several scenarios as one, and as an allocator sees them."""
+"""Vectorised environments as training takes them: of several scenarios as one, and as a policy sees them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 
 from agents.history import HISTORY, History
 from agents.tasks import training_config
-from agents.views import FEATURES_OF, allocator_view, authority, driver_view
+from agents.views import ACTION_OF, FEATURES_OF, driver_view, view
 from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
 
 
@@ -109,11 +109,7 @@ class TaskView(VecEnvWrapper):
         self._parent, self._kernel, self._task = env, env.env, task
 
     def _view(self, observations: Any) -> np.ndarray:
-        scenes = self._kernel.scenes
-        if self._task == "driver":
-            self._last = driver_view(observations, scenes["felt"])
-        else:
-            self._last = allocator_view(scenes, self._kernel.signals)
+        self._last = view(self._task, observations, self._kernel.scenes, self._kernel.signals)
         return self._last
 
     def reset(self) -> np.ndarray:
@@ -122,7 +118,7 @@ class TaskView(VecEnvWrapper):
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions for :meth:`step_wait`."""
-        self.venv.step_async(authority(actions) if self._task == "allocator" else actions)
+        self.venv.step_async(ACTION_OF[self._task](actions))
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Step all environments."""

@@ -23,8 +23,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from agents.drivers import POLICIES
 from agents.evaluate import BASELINE, KINDS, LEARNED, METRICS, Row, compare, measure, shown, where_it_loses
-from agents.tasks import HELD_OUT_DEGRADATIONS, TASKS
+from agents.tasks import HELD_OUT_DEGRADATIONS, LAG_RANGES, TASKS
 from agents.train import BEST, PROGRESS, Training
+from agents.views import DEAD_ZONE
 from experiments import style
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
@@ -35,10 +36,10 @@ SEEDS = range(5)
 DRAWN = [id for id, scenario in ENVIRONMENTS.items() if scenario not in ("two_lane", "curve")]
 """Environments that are drawn; the policies are compared in them."""
 
-IDS = [*DRAWN, "SharedControl/LeadBraking-v0", "SharedControl/LeadBraking-v0"]
-"""Environments of training: three shares for the one in which a driver who does not brake hard enough collides."""
+IDS = [*DRAWN, "SharedControl/LeadBraking-v0", "SharedControl/LaneChange-v0"]
+"""Environments of training: two shares for those in which a driver who is too slow to brake or to speed up collides."""
 
-STEPS = {"driver": 6_400_000, "allocator": 2_400_000}
+STEPS = {"driver": 4_900_000, "allocator": 2_900_000}
 """Steps of each training; whole segments are learned."""
 
 FOLDER = Path("results/policies")
@@ -145,6 +146,8 @@ def card(tables: dict[str, pd.DataFrame], jobs: int) -> str:
         versions=versions,
         jobs=jobs,
         cores=os.cpu_count(),
+        lag=[f"{str(entry['setting']).split('.')[-1]} {entry['low']} to {entry['high']}" for entry in LAG_RANGES],
+        dead_zone=round(100.0 * DEAD_ZONE),
         held_out=[f"`{kind}`" for kind in HELD_OUT_DEGRADATIONS],
         seeds_compared=tables["driver"]["seed"].nunique(),
         parts=[part_of_card(task, table) for task, table in tables.items()],
@@ -172,7 +175,7 @@ def publish(seeds: int, jobs: int, console: Console) -> None:
 
 
 def main(
-    seeds: Annotated[int, typer.Option(min=1, help="Held-out seeds of the comparison.")] = 5,
+    seeds: Annotated[int, typer.Option(min=1, help="Held-out seeds of the comparison.")] = 20,
     jobs: Annotated[int, typer.Option(min=1, help="Trainings at once.")] = os.cpu_count() or 1,
 ) -> None:
     """Train, compare, and replace what ships; stopped, it goes on where it was."""

@@ -66,6 +66,13 @@ def _ignore_literals(dispatcher: Any) -> None:
     dispatcher.get_call_template = get_call_template
 
 
+def is_cached(function: Callable[..., Any]) -> bool:
+    """Whether numba's cache on disk holds a compiled form of a function of this package."""
+    dispatcher: Any = function
+    module, name = dispatcher.py_func.__module__.rsplit(".", 1)[-1], dispatcher.py_func.__qualname__
+    return any(Path(dispatcher.stats.cache_path).glob(f"{module}.{name}-*.nbi"))
+
+
 @cache
 def _drop_stale_cache(directory: str) -> None:
     """Empty a cache directory that older sources filled.

@@ -7,6 +7,7 @@ named tuples they mirror.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple, TypeAlias, get_type_hints
 
 import numpy as np
@@ -33,6 +34,7 @@ PRESENT, NEAR_S, NEAR_D, NEAR_SPEED, NEAR_ROW = range(5)
 """Columns of a scene's neighbours: 1 if there is one, road-frame position [m], speed [m/s], traffic row."""
 
 
+@cache
 def record_dtype(parameters: type) -> np.dtype:
     """Aligned structured type with the fields of a named-tuple class, nested classes included."""
     fields = []

@@ -33,7 +33,7 @@ from shared_control_env.envs.config import Settings, plain
 from shared_control_env.envs.episode import draw_episode, is_random
 from shared_control_env.envs.situation import start_of
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, space_of
-from shared_control_env.vector import kernel
+from shared_control_env.vector import cold_start, kernel
 from shared_control_env.vector.records import (
     DISABLED,
     NEXT_STEP,
@@ -283,6 +283,7 @@ class SharedControlVectorEnv(VectorEnv):
             out.observations[:] = self._observations
         if self._random and not self._started:  # those without a seed
             self._prepare(np.array([generator is None for generator in self._generators]))
+        cold_start.prepare()
         self._advance(1, mask, mask, self._no_actions, out)
         self._started = True
         self._begin_next(mask)

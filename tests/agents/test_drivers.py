@@ -13,9 +13,13 @@ from stable_baselines3 import A2C, DQN, PPO, SAC
 from agents.drivers import authority_entry, driver_entry, shipped
 from agents.history import HISTORY, History
 from agents.model_driver import ModelDriver
+from agents.policy import LearnedDriver, Policy
 from agents.recorded import RecordedDriver, RecordingDriver
-from agents.views import ALLOCATOR_FEATURES, DRIVER_FEATURES, allocator_view, driver_view
+from agents.vec_envs import make_environment
+from agents.views import ALLOCATOR_FEATURES, DEAD_ZONE, DRIVER_FEATURES, allocator_view, command, driver_view
 from shared_control_env.controllers.driver import Driver, PredictiveDriver
+from shared_control_env.core.parameters import Limits
+from shared_control_env.core.records import SCENE
 from shared_control_env.evaluation import Suite, evaluate
 from shared_control_env.wrappers import DriverModel
 
@@ -140,9 +144,52 @@ def test_views_hold_what_they_name_and_no_fault():
     np.testing.assert_allclose(
         driver["automation's steering as felt [rad]"], info["u_a_act"][1] / np.radians(30.0), rtol=1e-6
     )
+    gap = 100.0 * observation[19] - 5.0
+    assert driver["gap to the preceding vehicle, ln(1 + gap / 1 m) [-]"] == pytest.approx(np.log(1 + gap) / np.log(96))
     view = dict(zip([name for name, _ in ALLOCATOR_FEATURES], allocator_view(scene, signals), strict=True))
     assert view["lateral risk r_y [-]"] == pytest.approx(float(signals["r_y"]))
     assert view["preceding distance along the road [m]"] == pytest.approx(observation[19], rel=1e-5)
     assert view["automation's degraded steering u_a,f [rad]"] == pytest.approx(signals["u_a_f"][1] / np.radians(30.0))
     for name in (*driver, *view):
         assert "fault" not in name
+
+
+@pytest.mark.parametrize(
+    ("present", "distance", "relative_speed", "expected"),
+    [
+        (1.0, 25.0, -4.0, (21.0, 4.0 / 20.0, 16.0 / 40.0)),  # closing in
+        (1.0, 25.0, 4.0, (21.0, -4.0 / 20.0, 0.0)),  # falling behind
+        (1.0, 5.0, -0.02, (1.1, 0.02 / 0.1, 0.0004 / 0.2)),  # touching
+        (0.0, 0.0, 0.0, (96.0, 0.0, 0.0)),  # nobody ahead
+    ],
+)
+def test_a_driver_sees_how_the_vehicle_ahead_grows(present, distance, relative_speed, expected):
+    observation = np.zeros(25)
+    observation[18:22] = present, distance / 100.0, 0.0, relative_speed / 20.0
+    grown, inverse, needed = driver_view(observation, np.zeros(2))[-3:]
+    np.testing.assert_allclose(np.exp(grown * np.log(96.0)), expected[0], rtol=1e-5)
+    assert inverse == pytest.approx(expected[1])
+    assert needed * Limits().a_max == pytest.approx(expected[2])
+
+
+def test_a_policy_that_asks_for_little_leaves_the_wheel_alone():
+    weights = np.zeros((2, HISTORY * len(DRIVER_FEATURES)))
+    little = np.full(2, 0.9 * DEAD_ZONE)
+    driver = LearnedDriver(Policy([(weights, little)], "tanh", False, {"task": "driver"}))
+    observation, scene = np.zeros(25), np.zeros(1, SCENE)[0]
+    np.testing.assert_array_equal(driver.act(observation, scene), [0.0, 0.0])
+    envs = [make_environment(["SharedControl/LaneKeeping-v0"], "driver", 2, 0) for _ in range(2)]
+    for env in envs:
+        env.reset()
+    seen = [env.step(np.tile(action, (2, 1)))[0] for env, action in zip(envs, (little, np.zeros(2)), strict=True)]
+    np.testing.assert_array_equal(*seen)
+
+
+def test_hands_that_ask_for_little_rest():
+    asked = np.linspace(-1.0, 1.0, 2001)
+    given = command(asked)
+    assert (given[np.abs(asked) <= DEAD_ZONE] == 0.0).all()
+    np.testing.assert_array_equal(given, -command(-asked))
+    assert (np.diff(given) >= 0.0).all()
+    assert np.abs(np.diff(given)).max() < 1.1e-3
+    assert given[-1] == 1.0

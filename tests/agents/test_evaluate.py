@@ -9,6 +9,7 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'train'")
 from typer.testing import CliRunner
 
 from agents import evaluate, render
+from agents.card import card_of
 from agents.evaluate import COMPARED, KINDS, LEARNED, METRICS, compare, losses, measure, over_seeds
 from agents.history import HISTORY
 from agents.policy import Policy
@@ -25,10 +26,9 @@ def idle(tmp_path):
     def make(task, biases):
         paths = []
         for i, bias in enumerate(biases):
-            features = [name for name, _ in FEATURES_OF[task]]
             actions = np.array([0.0, bias] if task == "driver" else [bias])
-            card = {"task": task, "features": features, "history": HISTORY, "environments": [ID]}
-            policy = Policy([(np.zeros((len(actions), len(features) * HISTORY)), actions)], "tanh", False, card)
+            weights = np.zeros((len(actions), len(FEATURES_OF[task]) * HISTORY))
+            policy = Policy([(weights, actions)], "tanh", False, card_of("none", [ID], task, 0, {}, ()))
             paths.append(tmp_path / f"{task}-{i}.npz")
             policy.save(paths[-1])
         return [str(path) for path in paths]
@@ -38,7 +38,7 @@ def idle(tmp_path):
 
 @pytest.mark.parametrize(("task", "baseline"), [("driver", "mpc"), ("allocator", "proportional")])
 def test_table(idle, task, baseline):
-    table = measure(task, idle(task, (0.0, 0.02)), ("bend",), 2)
+    table = measure(task, idle(task, (0.0, 0.1)), ("bend",), 2)
     assert table["seed"].min() >= HELD_OUT_SEED
     rows = compare(table, task)
     names = [LEARNED, *COMPARED[task], f"{LEARNED} - {baseline}"]

@@ -9,8 +9,11 @@ import gymnasium as gym
 import ray
 
 from agents import rllib
+from agents.card import card_of
+from agents.history import HISTORY
 from agents.policy import LearnedAllocator, LearnedDriver, Policy
 from agents.tasks import HELD_OUT_SEED, VALIDATION_SEED, training_config
+from agents.views import DRIVER_FEATURES
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
 
 ID = "SharedControl/LaneKeeping-v0"
@@ -27,11 +30,12 @@ def cluster():
 def test_a_few_iterations_train_a_policy_that_acts_as_the_module(tmp_path, task):
     normalisation = rllib.measured_normalisation(ID, task, num_envs=8, steps=50)
     algorithm = rllib.make_algorithm(ID, task, 0, normalisation, environments=16, steps=16)
-    before = rllib.export(algorithm, normalisation, rllib.card_of(ID, task, 0))
+    card = card_of("ppo on RLlib", [ID], task, 0, rllib.HYPERPARAMETERS, ("ray", "torch"))
+    before = rllib.export(algorithm, normalisation, card)
     for i in range(3):
         result = algorithm.train()
         assert result["env_runners"]["num_env_steps_sampled_lifetime"] >= (i + 1) * 256
-    rllib.export(algorithm, normalisation, rllib.card_of(ID, task, 0)).save(tmp_path / "policy.npz")
+    rllib.export(algorithm, normalisation, card).save(tmp_path / "policy.npz")
     policy = Policy.load(tmp_path / "policy.npz")
     assert any(np.abs(a[0] - b[0]).max() > 0.0 for a, b in zip(policy.layers, before.layers, strict=True))
     env = rllib.make_environment(ID, task, normalisation, 4)
@@ -64,8 +68,8 @@ def _drives_as_here(policy, task, env, normalisation):
 
 
 def test_episodes_that_end_begin_a_new_history():
-    size = 27
-    plain = rllib.Normalisation(np.zeros(4 * size), np.ones(4 * size))
+    size = len(DRIVER_FEATURES)
+    plain = rllib.Normalisation(np.zeros(HISTORY * size), np.ones(HISTORY * size))
     env = rllib.make_environment(ID, "driver", plain, 8)
     env.reset(seed=0)
     begun, ended = np.zeros(8, dtype=bool), 0
@@ -79,7 +83,7 @@ def test_episodes_that_end_begin_a_new_history():
 
 
 def test_runners_have_episodes_of_their_own_below_those_of_validation():
-    size = 4 * 27
+    size = HISTORY * len(DRIVER_FEATURES)
     env = rllib.make_environment(ID, "driver", rllib.Normalisation(np.zeros(size), np.ones(size)), 8)
     seeds = []
     for seed in (0, 1, HELD_OUT_SEED):

@@ -24,7 +24,7 @@ ID = "SharedControl/LaneKeeping-v0"
 SMALL = {
     "ppo": {"n_steps": 16, "batch_size": 64, "n_epochs": 2},
     "sac": {"buffer_size": 2000, "learning_starts": 64, "batch_size": 32, "gradient_steps": 1},
-    "td3": {"buffer_size": 2000, "learning_starts": 64, "batch_size": 32, "gradient_steps": 1},
+    "td3": {"buffer_size": 2000, "learning_starts": 64, "batch_size": 32, "gradient_steps": 1, "action_noise": 0.1},
 }
 
 
@@ -179,6 +179,7 @@ def test_a_folder_of_another_training_is_refused(tmp_path):
     [
         ("features", ["the fault"], "the fault"),
         ("history", 7, "history of 7"),
+        ("dead_zone", 0.5, "dead zone of 0.5; now it is 0.06"),
         ("environments", ["SharedControl/LaneKeeping-v9"], "LaneKeeping-v9, which is not registered.*LaneKeeping-v0"),
     ],
 )
@@ -188,6 +189,10 @@ def test_a_policy_for_other_spaces_or_environments_is_refused(tmp_path, name, va
     policy.card[name] = value
     policy.save(tmp_path / "other.npz")
     with pytest.raises(ValueError, match=message):
+        Policy.load(tmp_path / "other.npz")
+    del policy.card[name]
+    policy.save(tmp_path / "other.npz")
+    with pytest.raises(ValueError, match=f"its card lacks {name}"):
         Policy.load(tmp_path / "other.npz")
 
 

@@ -19,21 +19,34 @@ _REWARD = RewardParameters(progress=0.01, lane=4.0, speed=0.8, effort=1.3, comfo
 _ALLOCATOR_REWARD = _REWARD._replace(lane=8.0, effort=0.4, failure=600.0)
 
 
+def _lag(gains: tuple[float, float], times: tuple[float, float]) -> tuple[dict[str, Any], ...]:
+    """Draws of the driver's response: K_h and T_h [s]."""
+    ranges = {"driver_lag.K_h": gains, "driver_lag.T_h": times}
+    return tuple({"setting": name, "low": low, "high": high} for name, (low, high) in ranges.items())
+
+
 class Task(NamedTuple):
     """A task.
 
     Attributes:
         description: in a line.
         reward: weights of the terms of :mod:`core.reward`.
+        lag: draws of the driver's response.
     """
 
     description: str
     reward: RewardParameters
+    lag: tuple[dict[str, Any], ...]
 
 
+# Around the five responses that the paper identified. A driver who learns is drawn well beyond them: one who is not
+# sure of what the hands will do keeps a margin. The predictive driver takes the paper's lag for granted, and with so
+# much of others an allocator would mostly see it fail.
 TASKS = {
-    "driver": Task("compensate under the fuzzy limiter", _REWARD),
-    "allocator": Task("decide alpha_a beside the predictive driver", _ALLOCATOR_REWARD),
+    "driver": Task("compensate under the fuzzy limiter", _REWARD, _lag((0.75, 1.4), (0.1, 0.32))),
+    "allocator": Task(
+        "decide alpha_a beside the predictive driver", _ALLOCATOR_REWARD, _lag((0.9, 1.25), (0.12, 0.24))
+    ),
 }
 """Tasks by name."""
 
@@ -45,13 +58,6 @@ VALIDATION_SEED = 900_000
 
 HELD_OUT_SEED = 3_000_000
 """From here on policies are compared with others; neither training nor the choice of the best has seen these."""
-
-LAG_RANGES = (
-    {"setting": "driver_lag.K_h", "low": 0.75, "high": 1.4},
-    {"setting": "driver_lag.T_h", "low": 0.1, "high": 0.32},
-)
-"""The driver's response in training, well around the five that the paper identified: one who is not sure of what the
-hands will do keeps a margin."""
 
 
 def training_config(id: str, task: str) -> dict[str, Any]:
@@ -65,6 +71,6 @@ def training_config(id: str, task: str) -> dict[str, Any]:
         "authority": {"law": "proportional"},
         "faults": [],
         "degradations": [name for name in DEGRADATIONS if name not in HELD_OUT_DEGRADATIONS],
-        "randomise": [*CASES[ENVIRONMENTS[id]].settings.get("randomise", []), *LAG_RANGES],
+        "randomise": [*CASES[ENVIRONMENTS[id]].settings.get("randomise", []), *TASKS[task].lag],
         "reward": TASKS[task].reward._asdict(),
     }

@@ -23,7 +23,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from agents.drivers import POLICIES
 from agents.evaluate import BASELINE, KINDS, LEARNED, METRICS, Row, compare, measure, shown, where_it_loses
-from agents.tasks import HELD_OUT_DEGRADATIONS, LAG_RANGES, TASKS
+from agents.tasks import HELD_OUT_DEGRADATIONS, TASKS
 from agents.train import BEST, PROGRESS, Training
 from agents.views import DEAD_ZONE
 from experiments import style
@@ -82,9 +82,12 @@ def draw_curves(path: Path) -> None:
     """Validation return of every seed over the steps, a panel a task."""
     with style.figure(path, 1, len(TASKS), (9.0, 3.2)) as (_, axes):
         for axis, task in zip(axes[0], TASKS, strict=True):
-            for seed in SEEDS:
-                steps, scores = np.array(state_of(task, seed)["scores"]).T
+            curves = [np.array(state_of(task, seed)["scores"]).T for seed in SEEDS]
+            for seed, (steps, scores) in zip(SEEDS, curves, strict=True):
                 axis.plot(steps / 1e6, scores, label=f"seed {seed}")
+            later = np.concatenate([scores[1:] for _, scores in curves])
+            if later.size:  # the first segments are far below, and would leave nothing to be seen of the others
+                axis.set_ylim(later.min() - 0.1 * np.ptp(later) - 0.1, later.max() + 0.1 * np.ptp(later) + 0.1)
             axis.set(title=task, xlabel="steps [million]", ylabel="mean return, validation episodes")
         axes[0, 0].legend()
 
@@ -122,6 +125,9 @@ def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
         "task": task,
         "description": TASKS[task].description,
         "reward": ", ".join(f"{name} {value:g}" for name, value in TASKS[task].reward._asdict().items()),
+        "lag": ", ".join(
+            f"{draw['setting'].split('.')[-1]} {draw['low']} to {draw['high']}" for draw in TASKS[task].lag
+        ),
         "asked": STEPS[task],
         "steps": f"{states[0]['steps']:,}",
         "fastest": round(min(seconds)),
@@ -146,7 +152,6 @@ def card(tables: dict[str, pd.DataFrame], jobs: int) -> str:
         versions=versions,
         jobs=jobs,
         cores=os.cpu_count(),
-        lag=[f"{str(entry['setting']).split('.')[-1]} {entry['low']} to {entry['high']}" for entry in LAG_RANGES],
         dead_zone=round(100.0 * DEAD_ZONE),
         held_out=[f"`{kind}`" for kind in HELD_OUT_DEGRADATIONS],
         seeds_compared=tables["driver"]["seed"].nunique(),

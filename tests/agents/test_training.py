@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from agents import train
 from agents.policy import LearnedAllocator, LearnedDriver, Policy
-from agents.tasks import HELD_OUT_DEGRADATIONS, HELD_OUT_SEED, LAG_RANGES, TASKS, VALIDATION_SEED, training_config
+from agents.tasks import HELD_OUT_DEGRADATIONS, HELD_OUT_SEED, TASKS, VALIDATION_SEED, training_config
 from agents.vec_envs import make_environment
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.evaluation import Suite, evaluate
@@ -119,7 +119,7 @@ def test_training_draws_the_lag_and_every_degradation_but_those_held_out():
     assert not drawn & {("delay", False), ("coloured_noise", False), ("sign_error", False), ("bias", True)}
     lags = [(e.driver_lag.K_h, e.driver_lag.T_h) for e in env.get_attr("episodes")[0]]
     assert len(set(lags)) == 64
-    for values, entry in zip(zip(*lags, strict=True), LAG_RANGES, strict=True):
+    for values, entry in zip(zip(*lags, strict=True), TASKS["driver"].lag, strict=True):
         assert entry["low"] <= min(values) <= max(values) <= entry["high"]
 
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -103,6 +103,17 @@ def measure(
     held_out = table["degradation"].isin(HELD_OUT_DEGRADATIONS)
     name = table["driver" if task == "driver" else "authority"]
     return table.assign(name=name, kind=np.where(held_out, *KINDS))
+
+
+def measure_and_show(
+    console: Console, task: str, sources: Sequence[str], scenarios: Sequence[str], seeds: int, jobs: int
+) -> pd.DataFrame:
+    """:func:`measure` with a progress bar."""
+    columns = (TextColumn(f"episodes, {task}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console) as bar:
+        running = bar.add_task("episodes", total=None)
+        update = lambda done, total: bar.update(running, completed=done, total=total)
+        return measure(task, sources, scenarios, seeds, jobs, update)
 
 
 def compare(table: pd.DataFrame, task: str) -> list[Row]:
@@ -209,7 +220,7 @@ def show(rows: Sequence[Row], console: Console) -> None:
             console.print(f"  {metric.replace('_', ' ')}: {shown(value)}", markup=False)
 
 
-def scenarios_of(sources: Mapping[str, Path] | Sequence[str], task: str) -> list[str]:
+def scenarios_of(sources: Sequence[str], task: str) -> list[str]:
     """Scenarios that the policies among the sources were trained in, all of them known to each."""
     paths = [shipped(task).get(source, Path(source)) for source in sources]
     known = [Policy.load(path).card["environments"] for path in paths if path.suffix == ".npz"]
@@ -233,11 +244,7 @@ def main(
             raise ValueError(f"no policy of the task {task!r} ships; name files")
         names = [name.strip() for name in scenarios.split(",")] if scenarios else scenarios_of(chosen, task)
         choose("scenario", names, CASES)
-        columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        with Progress(*columns, console=console) as bar:
-            running = bar.add_task("episodes", total=None)
-            update = lambda done, total: bar.update(running, completed=done, total=total)
-            table = measure(task, chosen, names, seeds, jobs, update)
+        table = measure_and_show(console, task, chosen, names, seeds, jobs)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     console.print(f"{len(table)} episodes of {', '.join(names)}")

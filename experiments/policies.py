@@ -22,21 +22,23 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from agents.drivers import POLICIES
-from agents.evaluate import BASELINE, KINDS, LEARNED, METRICS, Row, compare, measure, shown, where_it_loses
+from agents.evaluate import BASELINE, KINDS, LEARNED, METRICS, Row, compare, measure_and_show, shown, where_it_loses
 from agents.tasks import HELD_OUT_DEGRADATIONS, TASKS
 from agents.train import BEST, PROGRESS, Training
 from agents.views import DEAD_ZONE
 from experiments import style
+from shared_control_env.evaluation import SUITES
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
 
 SEEDS = range(5)
 """Training seeds of each task."""
 
-DRAWN = [id for id, scenario in ENVIRONMENTS.items() if scenario not in ("two_lane", "curve")]
-"""Environments that are drawn; the policies are compared in them."""
+SCENARIOS = SUITES["full"].scenarios
+"""Those that are drawn; the policies are compared in them."""
 
-IDS = [*DRAWN, "SharedControl/LeadBraking-v0", "SharedControl/LaneChange-v0"]
+IDS = [id for id, scenario in ENVIRONMENTS.items() if scenario in SCENARIOS]
+IDS += ["SharedControl/LeadBraking-v0", "SharedControl/LaneChange-v0"]
 """Environments of training: two shares for those in which a driver who is too slow to brake or to speed up collides."""
 
 STEPS = {"driver": 4_900_000, "allocator": 2_900_000}
@@ -164,11 +166,7 @@ def publish(seeds: int, jobs: int, console: Console) -> None:
     tables = {}
     for task in TASKS:
         sources = [str(folder_of(task, seed) / BEST) for seed in SEEDS]
-        columns = (TextColumn(f"episodes, {task}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        with Progress(*columns, console=console) as bar:
-            running = bar.add_task("episodes", total=None)
-            update = lambda done, total, bar=bar, running=running: bar.update(running, completed=done, total=total)
-            tables[task] = measure(task, sources, [ENVIRONMENTS[id] for id in DRAWN], seeds, jobs, update)
+        tables[task] = measure_and_show(console, task, sources, SCENARIOS, seeds, jobs)
         write_atomically(FOLDER / f"{task}.parquet", tables[task].to_parquet)
     POLICIES.mkdir(exist_ok=True)
     for task in TASKS:

@@ -26,7 +26,7 @@ def test_a_small_run_is_published(tmp_path, monkeypatch):
         ("FOLDER", tmp_path / "trainings"),
         ("POLICIES", tmp_path / "shipped"),
         ("IDS", ["SharedControl/Bend-v0", "SharedControl/Bend-v0"]),
-        ("DRAWN", ["SharedControl/Bend-v0"]),
+        ("SCENARIOS", ("bend",)),
         ("SEEDS", range(2)),
     ):
         monkeypatch.setattr(policies, name, value)

@@ -17,7 +17,7 @@ from numba.core import event
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parent.parent
-_COMPILED_SOURCES = ("core/*.py", "vector/kernel.py", "vector/records.py")
+_COMPILED_SOURCES = ("core/*.py", "vector/kernel.py", "vector/records.py", "vector/solvers.py")
 
 
 def jit(function: F) -> F:

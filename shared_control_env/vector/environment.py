@@ -37,6 +37,7 @@ from shared_control_env.vector import cold_start, kernel
 from shared_control_env.vector.records import (
     DISABLED,
     NEXT_STEP,
+    NOT_LOADED,
     PROGRAM,
     SAME_STEP,
     SOLVER,
@@ -155,7 +156,7 @@ class SharedControlVectorEnv(VectorEnv):
         shares = max(self.threads, min(SHARES_PER_THREAD * self.threads, num_envs // FEWEST_PER_THREAD))
         self._edges = np.linspace(0, num_envs, shares + 1 if self._pool else 2).astype(int).tolist()
         self._works = np.zeros(len(self._edges) - 1, WORKSPACE)
-        self._programs = np.zeros(len(self._edges) - 1, PROGRAM) if driver else None
+        self._programs = np.zeros(len(self._edges) - 1, PROGRAM)
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
         self._seeds: tuple[int | None, ...] = (None,) * num_envs
@@ -198,7 +199,9 @@ class SharedControlVectorEnv(VectorEnv):
             frames=settings.simulation_frequency // settings.policy_frequency,
             dt=1.0 / settings.simulation_frequency,
             limiter=self._limiter,
+            driver=self._driver,
             autoreset=AUTORESET[self._mode],
+            solvers=NOT_LOADED,
         )
         self._batch = Batch(
             parameters=np.zeros(n, starts.parameters.dtype),
@@ -283,7 +286,8 @@ class SharedControlVectorEnv(VectorEnv):
             out.observations[:] = self._observations
         if self._random and not self._started:  # those without a seed
             self._prepare(np.array([generator is None for generator in self._generators]))
-        cold_start.prepare()
+        if self._setup.solvers is NOT_LOADED:
+            self._load_solvers()
         self._advance(1, mask, mask, self._no_actions, out)
         self._started = True
         self._begin_next(mask)
@@ -390,6 +394,14 @@ class SharedControlVectorEnv(VectorEnv):
             self._templates = templates
         self._viewer_env = None
         self._set_up()
+
+    def _load_solvers(self) -> None:
+        """Have all compiled that a step runs."""
+
+        def compile_kernel() -> None:
+            self._advance(1, self._nobody, self._nobody, self._no_actions, self._outputs())
+
+        self._setup = self._setup._replace(solvers=cold_start.compile_all(compile_kernel, self._driver))
 
     def _prepare(self, mask: np.ndarray) -> None:
         """Draw the next episode of the environments that the mask names."""

@@ -4,31 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core import active_set_qp, closed_loop, delaunay, fuzzy
+from shared_control_env.core import closed_loop, fuzzy
 from shared_control_env.core.collision import overlap
-from shared_control_env.core.driver_qp import build_program
 from shared_control_env.core.dynamics import plant_step
 from shared_control_env.core.info import note_outcome, note_signals
 from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.observation import observe
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, SPEED, Record, X, Y
-from shared_control_env.core.safe_area import search_triangles, whole_region
+from shared_control_env.core.safe_area import whole_region
 from shared_control_env.core.scene import holes_in_region, perceive
 from shared_control_env.core.traffic import decide_acceleration, move
+from shared_control_env.vector import solvers
 from shared_control_env.vector.records import NEXT_STEP, SAME_STEP, Batch, Outputs, Setup
+
+automate, find_path, drive = solvers.AUTOMATE.call, solvers.FIND_PATH.call, solvers.DRIVE.call
+"""The solvers at the addresses in :class:`Setup`."""
 
 
 @jit_inlined
-def find_area(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, work: Record) -> None:
+def find_area(
+    scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, setup: Setup, work: Record
+) -> None:
     """Safe area of a scene; without a vehicle inside, the driving region itself is exact."""
     count = holes_in_region(traffic, line, scene.region, work.corners)
     if count == 0:
         whole_region(scene.region, scene.area)
         return
-    n = max(0, delaunay.triangulate(scene.region, work.corners, count, work.triangles))
-    triangles = work.triangles.triangles[:n]
-    search_triangles(triangles, scene.region[0], scene.region[1], scene.z[1], p.vehicle.width, scene.area)
+    find_path(setup.solvers.find_path, scene, p, count, work)
 
 
 @jit_inlined
@@ -37,39 +40,14 @@ def perceive_and_plan(i: int, k: int, batch: Batch, setup: Setup, work: Record) 
     p, scene, signals = batch.parameters[i], batch.scenes[i], batch.signals[i]
     line, faults = batch.lines[i], batch.faults[i]
     perceive(k, batch.states[i], batch.traffic[i], line, p, scene)
-    find_area(scene, batch.traffic[i], line, p, work)
+    find_area(scene, batch.traffic[i], line, p, setup, work)
     automation = batch.automations[i]
     y, v_target = closed_loop.misjudge(scene, faults, p, signals)
-    status, iterations, residual = closed_loop.automate(scene, p, automation, work.solver)
+    status, iterations, residual = automate(setup.solvers.automate, scene, p, automation, work.solver)
     closed_loop.judge_rightly(scene, y, v_target)
     signals.status, signals.iterations, signals.residual = status, iterations, residual
     signals.u_a_des[0], signals.u_a_des[1] = automation.u_a_des[0], automation.u_a_des[1]
     closed_loop.monitor(scene, batch.traffic[i], line, faults, batch.fault_memories[i], p, signals)
-
-
-@jit_inlined
-def drive_by_program(
-    scene: Record, p: Parameters, memory: Record, work: Record, program: Record, report: Record
-) -> None:
-    """The predictive driver's command (Eq. 15) by the active-set method, left in ``work.command``.
-
-    When the solver fails the last command is held and the failure counted.
-    """
-    g = program
-    build_program(scene, memory.u_h_des, p, work.solver, g.P, g.q, g.A, g.low, g.high)
-    n = 2 * p.driver.H_c + 1
-    m = 2 * p.driver.H_p + n
-    status, iterations, primal, dual = active_set_qp.solve_qp(
-        n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set
-    )
-    if status == active_set_qp.SOLVED:
-        work.command[0] = min(max(g.x[0], -1.0), 1.0) * p.limits.a_max
-        work.command[1] = min(max(g.x[1], -1.0), 1.0) * p.limits.delta_max
-    else:
-        work.command[0], work.command[1] = memory.u_h_des[0], memory.u_h_des[1]
-        memory.driver_failures += 1
-    report.status, report.iterations = status, iterations
-    report.primal_residual, report.dual_residual = primal, dual
 
 
 @jit
@@ -80,7 +58,7 @@ def decide(
     batch: Batch,
     setup: Setup,
     work: Record,
-    programs: np.ndarray | None,
+    programs: np.ndarray,
     share: int,
     report: Record,
 ) -> float:
@@ -91,17 +69,16 @@ def decide(
         commands: driver's commands over their limits, (N, 2); not read where the driver is bound.
         alphas: authorities, (N, 1); not read where the limiter is bound.
         batch, setup, work: see their types.
-        programs: records of :data:`records.PROGRAM`, one a share; None leaves the driver's solver uncompiled.
+        programs: records of :data:`records.PROGRAM`, one a share; not read where the driver is not bound.
         share: which of them is ours.
         report: record of :data:`records.SOLVER`, written.
     """
     p, scene, memory = batch.parameters[i], batch.scenes[i], batch.memories[i]
-    if programs is None:
+    if setup.driver:
+        drive(setup.solvers.drive, scene, p, memory, work, programs[share], report)
+    else:
         work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * p.limits.a_max
         work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * p.limits.delta_max
-    else:
-        drive_by_program(scene, p, memory, work, programs[share], report)
-        report.failures = memory.driver_failures
     if setup.limiter:
         return fuzzy.authority(batch.signals[i].r_x, batch.signals[i].r_y, p.authority.operators)
     return min(max(alphas[i, 0], 0.0), 1.0)
@@ -136,7 +113,7 @@ def apply(
     setup: Setup,
     out: Outputs,
     work: Record,
-    programs: np.ndarray | None,
+    programs: np.ndarray,
     share: int,
 ) -> None:
     """First half of a decision of environment i: both slots, the loop's commands, the vehicles' motion."""
@@ -203,7 +180,7 @@ def advance_one(
     setup: Setup,
     out: Outputs,
     work: Record,
-    programs: np.ndarray | None,
+    programs: np.ndarray,
     share: int,
 ) -> None:
     """Step environment i, or begin its next episode; the order is that of :class:`SharedControlEnv`."""
@@ -249,7 +226,7 @@ def advance(
     rewards: np.ndarray,
     ends: np.ndarray,
     works: np.ndarray,
-    programs: np.ndarray | None,
+    programs: np.ndarray,
     share: int,
 ) -> None:
     """Advance the environments from begin to end, each by some steps in a row, resetting as the autoreset mode says.
@@ -266,7 +243,7 @@ def advance(
         rewards: of every step, written, (steps, N).
         ends: whether an episode ended at each step, written, (steps, N).
         works: records of :data:`records.WORKSPACE`, one a share.
-        programs: records of :data:`records.PROGRAM`, one a share, where the driver is bound; else None.
+        programs: records of :data:`records.PROGRAM`, one a share; not read where the driver is not bound.
         share: which of them is ours.
     """
     work = works[share]

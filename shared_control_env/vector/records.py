@@ -62,6 +62,22 @@ class Starts(NamedTuple):
     plans: np.ndarray
 
 
+class Addresses(NamedTuple):
+    """Where the solvers of :mod:`vector.solvers` are in memory; 0 for one that is not loaded.
+
+    Attributes:
+        automate, find_path, drive: of the functions of these names.
+    """
+
+    automate: int
+    find_path: int
+    drive: int
+
+
+NOT_LOADED = Addresses(0, 0, 0)
+"""Before the first reset."""
+
+
 class Setup(NamedTuple):
     """What all environments share.
 
@@ -71,7 +87,9 @@ class Setup(NamedTuple):
         frames: simulation steps of one decision.
         dt: of a simulation step [s].
         limiter: whether the fuzzy inference decides alpha_a.
+        driver: whether the predictive driver decides the driver's command.
         autoreset: :data:`NEXT_STEP`, :data:`SAME_STEP` or :data:`DISABLED`.
+        solvers: where the compiled solvers are.
     """
 
     starts: Starts
@@ -79,7 +97,9 @@ class Setup(NamedTuple):
     frames: int
     dt: float
     limiter: bool
+    driver: bool
     autoreset: int
+    solvers: Addresses
 
 
 class Outputs(NamedTuple):

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, Record
 
 SOLVED, ITERATION_LIMIT, FAILED = 0, 1, 2
@@ -65,7 +65,7 @@ WORKSPACE = np.dtype(
 """Scratch of one solver; one record a thread."""
 
 
-@jit
+@jit_inlined
 def solve_qp(
     n: int,
     m: int,

@@ -149,7 +149,7 @@ def _plan_step(U: np.ndarray, p: Parameters, work: Record) -> float:
     return slope
 
 
-@jit
+@jit_inlined
 def solve(U: np.ndarray, scene: Record, p: Parameters, iterations: int, work: Record) -> tuple[int, int, float, float]:
     """Minimise Eq. 13 over the bounded commands, from the guess U.
 

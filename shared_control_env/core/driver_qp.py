@@ -17,7 +17,7 @@ import numpy as np
 
 from shared_control_env.core.condensing import add_effort, add_tracking, clear, propagate
 from shared_control_env.core.dynamics import V_X, V_Y, R, S, Y, implicit_step_jacobian
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit_inlined
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import Record
 from shared_control_env.core.safe_area import lateral_bounds
@@ -37,7 +37,7 @@ UNBOUNDED = 1e20
 """Stands for infinity in the bounds, as OSQP takes it."""
 
 
-@jit
+@jit_inlined
 def build_program(
     scene: Record,
     u_last: np.ndarray,

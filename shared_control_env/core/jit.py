@@ -17,7 +17,7 @@ from numba.core import event
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parent.parent
-_COMPILED_SOURCES = ("core/*.py", "vector/kernel.py", "vector/records.py", "vector/solvers.py")
+_COMPILED_SOURCES = ("core/*.py", *(f"vector/{name}.py" for name in ("intrinsics", "kernel", "records", "solvers")))
 
 
 def jit(function: F) -> F:

@@ -50,8 +50,8 @@ def _cores() -> int:
 
 
 def _compile_beside(compile_kernel: Callable[[], None], driver: bool) -> None:
-    """Compile the kernel, and the safe area's solver too where the driver's gives the other process enough to do."""
-    theirs = ("AUTOMATE", "DRIVE") if driver else ("AUTOMATE", "FIND_PATH")
+    """Compile the kernel, and the search too where the driver's solver gives the other process enough to do."""
+    theirs = ("AUTOMATE", "TRIANGULATE", "DRIVE" if driver else "SEARCH")
     addresses = ", ".join(f"solvers.{name}.address" for name in theirs)
     code = f"import sys; sys.path[:] = {sys.path!r}; from {solvers.__package__} import solvers; {addresses}"
     silent: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
@@ -62,7 +62,7 @@ def _compile_beside(compile_kernel: Callable[[], None], driver: bool) -> None:
     try:
         compile_kernel()
         if driver:
-            _ = solvers.FIND_PATH.address
+            _ = solvers.SEARCH.address
         other.wait(PATIENCE)
     except subprocess.TimeoutExpired:
         pass

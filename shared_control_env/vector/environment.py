@@ -64,9 +64,6 @@ ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_ve
 FEWEST_PER_THREAD = 64
 """Environments under which another thread costs more than it saves."""
 
-SHARES_PER_THREAD = 4
-"""Shares of the environments for every thread: one that falls behind leaves some of its own to the others."""
-
 
 class Actions(NamedTuple):
     """Both slots of every environment's action; zeros for a bound one.
@@ -152,11 +149,9 @@ class SharedControlVectorEnv(VectorEnv):
         self._define_spaces()
         wanted = threads or os.cpu_count() or 1
         self.threads = max(1, min(wanted, num_envs // FEWEST_PER_THREAD)) if threads is None else min(wanted, num_envs)
-        self._pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
-        shares = max(self.threads, min(SHARES_PER_THREAD * self.threads, num_envs // FEWEST_PER_THREAD))
-        self._edges = np.linspace(0, num_envs, shares + 1 if self._pool else 2).astype(int).tolist()
-        self._works = np.zeros(len(self._edges) - 1, WORKSPACE)
-        self._programs = np.zeros(len(self._edges) - 1, PROGRAM)
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._works = np.zeros(self.threads, WORKSPACE)
+        self._programs = np.zeros(self.threads, PROGRAM)
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
         self._seeds: tuple[int | None, ...] = (None,) * num_envs
@@ -427,14 +422,14 @@ class SharedControlVectorEnv(VectorEnv):
         return result
 
     def _advance(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
-        """Run :func:`kernel.advance`, the environments split over the threads; it lets go of Python's lock."""
+        """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
         rewards = np.zeros((steps, self.num_envs))
         ends = np.zeros((steps, self.num_envs), dtype=bool)
+        taken = np.zeros(1, dtype=np.int64)
 
-        def work(share: int) -> None:
+        def work(thread: int) -> None:
             kernel.advance(
-                self._edges[share],
-                self._edges[share + 1],
+                taken,
                 steps,
                 active,
                 resets,
@@ -447,13 +442,13 @@ class SharedControlVectorEnv(VectorEnv):
                 ends,
                 self._works,
                 self._programs,
-                share,
+                thread,
             )
 
-        if self._pool is None:
-            work(0)
-        else:
-            list(self._pool.map(work, range(len(self._edges) - 1)))  # the list raises what a share raised
+        others = [self._pool.submit(work, thread) for thread in range(1, self.threads)] if self._pool else []
+        work(0)
+        for other in others:
+            other.result()  # raises what it raised
         return Rollout(rewards, ends)
 
     def _outputs(self) -> Outputs:

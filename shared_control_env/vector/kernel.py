@@ -16,22 +16,26 @@ from shared_control_env.core.safe_area import whole_region
 from shared_control_env.core.scene import holes_in_region, perceive
 from shared_control_env.core.traffic import decide_acceleration, move
 from shared_control_env.vector import solvers
+from shared_control_env.vector.intrinsics import fetch_add
 from shared_control_env.vector.records import NEXT_STEP, SAME_STEP, Batch, Outputs, Setup
 
-automate, find_path, drive = solvers.AUTOMATE.call, solvers.FIND_PATH.call, solvers.DRIVE.call
-"""The solvers at the addresses in :class:`Setup`."""
+automate, drive = solvers.AUTOMATE.call, solvers.DRIVE.call
+triangulate, search = solvers.TRIANGULATE.call, solvers.SEARCH.call
+"""Calls of the solvers, at their addresses in :class:`Setup`."""
+
+TAKEN_AT_ONCE = 16
+"""Environments that a thread takes at a time: few, so that one that is held up leaves the others no long wait."""
 
 
 @jit_inlined
-def find_area(
-    scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, setup: Setup, work: Record
-) -> None:
+def find_area(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, setup: Setup, work: Record) -> None:
     """Safe area of a scene; without a vehicle inside, the driving region itself is exact."""
     count = holes_in_region(traffic, line, scene.region, work.corners)
     if count == 0:
         whole_region(scene.region, scene.area)
         return
-    find_path(setup.solvers.find_path, scene, p, count, work)
+    n = triangulate(setup.solvers.triangulate, scene, count, work)
+    search(setup.solvers.search, scene, p, n, work)
 
 
 @jit_inlined
@@ -50,7 +54,7 @@ def perceive_and_plan(i: int, k: int, batch: Batch, setup: Setup, work: Record) 
     closed_loop.monitor(scene, batch.traffic[i], line, faults, batch.fault_memories[i], p, signals)
 
 
-@jit
+@jit_inlined
 def decide(
     i: int,
     commands: np.ndarray,
@@ -58,8 +62,7 @@ def decide(
     batch: Batch,
     setup: Setup,
     work: Record,
-    programs: np.ndarray,
-    share: int,
+    program: Record,
     report: Record,
 ) -> float:
     """Bring both slots of the action together: the driver's command in ``work.command``, and alpha_a, returned.
@@ -69,13 +72,12 @@ def decide(
         commands: driver's commands over their limits, (N, 2); not read where the driver is bound.
         alphas: authorities, (N, 1); not read where the limiter is bound.
         batch, setup, work: see their types.
-        programs: records of :data:`records.PROGRAM`, one a share; not read where the driver is not bound.
-        share: which of them is ours.
+        program: record of :data:`records.PROGRAM`; not read where the driver is not bound.
         report: record of :data:`records.SOLVER`, written.
     """
     p, scene, memory = batch.parameters[i], batch.scenes[i], batch.memories[i]
     if setup.driver:
-        drive(setup.solvers.drive, scene, p, memory, work, programs[share], report)
+        drive(setup.solvers.drive, scene, p, memory, work, program, report)
     else:
         work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * p.limits.a_max
         work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * p.limits.delta_max
@@ -113,12 +115,11 @@ def apply(
     setup: Setup,
     out: Outputs,
     work: Record,
-    programs: np.ndarray,
-    share: int,
+    program: Record,
 ) -> None:
     """First half of a decision of environment i: both slots, the loop's commands, the vehicles' motion."""
     scene, signals, memory = batch.scenes[i], batch.signals[i], batch.memories[i]
-    alpha_a = decide(i, commands, alphas, batch, setup, work, programs, share, out.solver[i])
+    alpha_a = decide(i, commands, alphas, batch, setup, work, program, out.solver[i])
     closed_loop.blend(work.command, alpha_a, batch.parameters[i], scene, memory, signals)
     note_signals(scene, signals, batch.faults[i], batch.automations[i].failures, out.infos[i])
     simulate(i, batch, setup, work)
@@ -180,8 +181,7 @@ def advance_one(
     setup: Setup,
     out: Outputs,
     work: Record,
-    programs: np.ndarray,
-    share: int,
+    program: Record,
 ) -> None:
     """Step environment i, or begin its next episode; the order is that of :class:`SharedControlEnv`."""
     scene, signals, memory, p = batch.scenes[i], batch.signals[i], batch.memories[i], batch.parameters[i]
@@ -190,7 +190,7 @@ def advance_one(
         restore(i, batch, setup, out)
         scene.k = -1
     else:
-        apply(i, commands, alphas, batch, setup, out, work, programs, share)
+        apply(i, commands, alphas, batch, setup, out, work, program)
     perceive_and_plan(i, scene.k + 1, batch, setup, work)
     if resetting:
         note_start(i, batch, setup, out, work)
@@ -213,8 +213,7 @@ def keep_final(i: int, out: Outputs) -> None:
 
 @jit
 def advance(
-    begin: int,
-    end: int,
+    taken: np.ndarray,
     steps: int,
     active: np.ndarray,
     resets: np.ndarray,
@@ -227,12 +226,14 @@ def advance(
     ends: np.ndarray,
     works: np.ndarray,
     programs: np.ndarray,
-    share: int,
+    thread: int,
 ) -> None:
-    """Advance the environments from begin to end, each by some steps in a row, resetting as the autoreset mode says.
+    """Advance the environments, each by some steps in a row, resetting as the autoreset mode says.
+
+    Any number of threads may call it for the same environments; each takes the next few that nobody has taken.
 
     Args:
-        begin, end: range of environments.
+        taken: environments that threads have taken so far, (1,).
         steps: how many time steps; the actions are held or bound.
         active: environments that are advanced at all, (N,).
         resets: environments whose first step is a reset, (N,).
@@ -242,30 +243,33 @@ def advance(
         out: of the last step.
         rewards: of every step, written, (steps, N).
         ends: whether an episode ended at each step, written, (steps, N).
-        works: records of :data:`records.WORKSPACE`, one a share.
-        programs: records of :data:`records.PROGRAM`, one a share; not read where the driver is not bound.
-        share: which of them is ours.
+        works: records of :data:`records.WORKSPACE`, one a thread.
+        programs: records of :data:`records.PROGRAM`, one a thread; not read where the driver is not bound.
+        thread: which of them is ours.
     """
-    work = works[share]
-    for i in range(begin, end):
-        if not active[i]:
-            continue
-        k = 0
-        resetting = resets[i] or (setup.autoreset == NEXT_STEP and batch.ended[i])
-        same_step = terminated = truncated = False
-        while k < steps:
-            advance_one(i, resetting, commands, alphas, batch, setup, out, work, programs, share)
-            if same_step:
-                out.rewards[i], out.terminations[i], out.truncations[i] = rewards[k, i], terminated, truncated
-            else:
-                rewards[k, i] = out.rewards[i]
-                terminated, truncated = out.terminations[i], out.truncations[i]
-                ends[k, i] = terminated or truncated
-            same_step = not same_step and ends[k, i] and setup.autoreset == SAME_STEP
-            if same_step:
-                keep_final(i, out)
-                resetting = True
+    work, program = works[thread], programs[thread]
+    first = fetch_add(taken, TAKEN_AT_ONCE)
+    while first < active.shape[0]:
+        for i in range(first, min(first + TAKEN_AT_ONCE, active.shape[0])):
+            if not active[i]:
                 continue
-            batch.ended[i] = ends[k, i] and setup.autoreset != SAME_STEP
-            resetting = setup.autoreset == NEXT_STEP and batch.ended[i]
-            k += 1
+            k = 0
+            resetting = resets[i] or (setup.autoreset == NEXT_STEP and batch.ended[i])
+            same_step = terminated = truncated = False
+            while k < steps:
+                advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
+                if same_step:
+                    out.rewards[i], out.terminations[i], out.truncations[i] = rewards[k, i], terminated, truncated
+                else:
+                    rewards[k, i] = out.rewards[i]
+                    terminated, truncated = out.terminations[i], out.truncations[i]
+                    ends[k, i] = terminated or truncated
+                same_step = not same_step and ends[k, i] and setup.autoreset == SAME_STEP
+                if same_step:
+                    keep_final(i, out)
+                    resetting = True
+                    continue
+                batch.ended[i] = ends[k, i] and setup.autoreset != SAME_STEP
+                resetting = setup.autoreset == NEXT_STEP and batch.ended[i]
+                k += 1
+        first = fetch_add(taken, TAKEN_AT_ONCE)

@@ -1,4 +1,4 @@
-"""Arrays of many environments, and the scratch of one share of them."""
+"""Arrays of many environments, and the scratch of one thread."""
 
 from __future__ import annotations
 
@@ -66,15 +66,16 @@ class Addresses(NamedTuple):
     """Where the solvers of :mod:`vector.solvers` are in memory; 0 for one that is not loaded.
 
     Attributes:
-        automate, find_path, drive: of the functions of these names.
+        automate, triangulate, search, drive: of the functions of these names.
     """
 
     automate: int
-    find_path: int
+    triangulate: int
+    search: int
     drive: int
 
 
-NOT_LOADED = Addresses(0, 0, 0)
+NOT_LOADED = Addresses(0, 0, 0, 0)
 """Before the first reset."""
 
 
@@ -149,7 +150,7 @@ WORKSPACE = np.dtype(
     ],
     align=True,
 )
-"""Scratch of one share of the environments."""
+"""Scratch of one thread."""
 
 PROGRAM = np.dtype(
     [
@@ -164,4 +165,4 @@ PROGRAM = np.dtype(
     ],
     align=True,
 )
-"""The driver's quadratic program and its solver's scratch, of one share of the environments."""
+"""The driver's quadratic program and its solver's scratch, of one thread."""

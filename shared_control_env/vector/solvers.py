@@ -1,4 +1,4 @@
-"""The three solvers of a step, each compiled apart from the kernel, which calls them by their addresses.
+"""The solvers of a step, each compiled apart from the kernel, which calls them by their addresses.
 
 LLVM optimises all that a function calls anew together with it. Through an address the kernel stays small, the solver
 of a driver that nobody bound is never compiled, and two processes can compile at the same time (:mod:`cold_start`).
@@ -11,16 +11,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import cfunc, float64, from_dtype, int64, types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from shared_control_env.core import active_set_qp, closed_loop, condensing, delaunay
 from shared_control_env.core.driver_qp import build_program
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, Record, record_dtype
 from shared_control_env.core.safe_area import search_triangles
+from shared_control_env.vector.intrinsics import call_of
 from shared_control_env.vector.records import PROGRAM, SOLVER, WORKSPACE, Addresses
 
 
@@ -39,31 +37,14 @@ class Solver:
     def __init__(self, function: Callable[..., Any], result: Any, *arguments: Any) -> None:
         kinds = [from_dtype(kind) if isinstance(kind, np.dtype) else kind for kind in arguments]
         self._function, self._signature = function, result(*kinds)
-        self.call = _call_of(self._signature)
+        self.call = call_of(self._signature)
 
     @cached_property
     def address(self) -> int:
         """Where it is in memory; it is compiled for that, or read from numba's cache."""
-        self._compiled = cfunc(self._signature, cache=True, error_model="numpy")(self._function)
-        return int(self._compiled.address)
-
-
-def _call_of(signature: Any) -> Any:
-    """A call of a function with this signature at an address, in compiled code."""
-
-    @intrinsic
-    def call(typing_context: Any, address: Any, *arguments: Any) -> Any:
-        if tuple(arguments) != signature.args:
-            raise TypeError(f"a solver of {signature.args} was called with {arguments}")
-
-        def generate(context: Any, builder: Any, found: Any, values: Any) -> Any:
-            result, *kinds = (context.get_value_type(kind) for kind in (signature.return_type, *signature.args))
-            pointer = builder.inttoptr(values[0], ir.FunctionType(result, kinds).as_pointer())
-            return builder.call(pointer, cgutils.unpack_tuple(builder, values[1]))
-
-        return signature.return_type(address, types.StarArgTuple(arguments)), generate
-
-    return call
+        compiled: Any = cfunc(self._signature, cache=True, error_model="numpy")(self._function)
+        self._compiled = compiled  # lest its code is freed
+        return compiled.address
 
 
 def automate(scene: Record, p: Parameters, memory: Record, work: Record) -> tuple[int, int, float]:
@@ -71,16 +52,29 @@ def automate(scene: Record, p: Parameters, memory: Record, work: Record) -> tupl
     return closed_loop.automate(scene, p, memory, work)
 
 
-def find_path(scene: Record, p: Parameters, count: int, work: Record) -> None:
-    """Safe area between the vehicles in the driving region, by triangulation; ``work.corners`` holds their corners.
+def triangulate(scene: Record, count: int, work: Record) -> int:
+    """Triangles of the driving region around the vehicles in it, left in ``work.triangles``.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+        count: vehicles in the region; ``work.corners`` holds their corners.
+        work: record of :data:`records.WORKSPACE`.
+
+    Returns:
+        How many; none where :func:`delaunay.triangulate` gives up.
+    """
+    return max(0, delaunay.triangulate(scene.region, work.corners, count, work.triangles))
+
+
+def search(scene: Record, p: Parameters, n: int, work: Record) -> None:
+    """Safe area through the first n triangles of ``work.triangles`` by :func:`safe_area.search_triangles`.
 
     Args:
         scene: record of :data:`records.SCENE`; its area is written.
         p: parameters.
-        count: vehicles in the region.
+        n: triangles.
         work: record of :data:`records.WORKSPACE`.
     """
-    n = max(0, delaunay.triangulate(scene.region, work.corners, count, work.triangles))
     triangles = work.triangles.triangles[:n]
     search_triangles(triangles, scene.region[0], scene.region[1], scene.z[1], p.vehicle.width, scene.area)
 
@@ -118,13 +112,12 @@ def drive(scene: Record, p: Parameters, memory: Record, work: Record, program: R
 
 _P = record_dtype(Parameters)
 
-AUTOMATE = Solver(
-    automate, types.Tuple((int64, int64, float64)), SCENE, _P, AUTOMATION_MEMORY, condensing.WORKSPACE
-)
-FIND_PATH = Solver(find_path, types.void, SCENE, _P, int64, WORKSPACE)
+AUTOMATE = Solver(automate, types.Tuple((int64, int64, float64)), SCENE, _P, AUTOMATION_MEMORY, condensing.WORKSPACE)
+TRIANGULATE = Solver(triangulate, int64, SCENE, int64, WORKSPACE)
+SEARCH = Solver(search, types.void, SCENE, _P, int64, WORKSPACE)
 DRIVE = Solver(drive, types.void, SCENE, _P, MEMORY, WORKSPACE, PROGRAM, SOLVER)
 
 
 def addresses(driver: bool) -> Addresses:
     """Addresses of the solvers, compiled now unless they are in numba's cache; 0 for a driver that is not bound."""
-    return Addresses(AUTOMATE.address, FIND_PATH.address, DRIVE.address if driver else 0)
+    return Addresses(AUTOMATE.address, TRIANGULATE.address, SEARCH.address, DRIVE.address if driver else 0)

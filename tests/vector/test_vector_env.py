@@ -15,6 +15,7 @@ from shared_control_env.envs.cases import TWO_LANE as CASE
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.vector.environment import SharedControlVectorEnv
+from shared_control_env.vector.kernel import TAKEN_AT_ONCE
 from shared_control_env.wrappers import DriverModel
 
 IDS = ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"]
@@ -230,7 +231,7 @@ def test_a_rollout_is_the_steps_in_one_call():
 def test_threads_change_nothing():
     results = []
     for threads in (1, 2, 3):
-        env = gym.make_vec(TWO_LANE, num_envs=7, threads=threads)
+        env = gym.make_vec(TWO_LANE, num_envs=5 * TAKEN_AT_ONCE + 3, threads=threads)
         env.reset(seed=0)
         rng = np.random.default_rng(0)
         results.append([env.step(random_driver(rng, env))[:4] for _ in range(40)])

@@ -43,7 +43,9 @@ def predict_ego(scene: Record, u_f: np.ndarray, line: np.ndarray, p: Parameters,
     state = scene.state
     xi = signals.prediction
     implicit_step(state, u_f[0], u_f[1], 0.0, p.task.dt, p.vehicle, xi)
-    ctra(state[0], state[1], state[2], state[V_X], u_f[0], xi[R], p.task.tau_p, xi)
+    xi[0], xi[1], xi[2], xi[3], xi[4], xi[5] = ctra(
+        state[0], state[1], state[2], state[V_X], u_f[0], xi[R], p.task.tau_p
+    )
     s, d, _, _ = locate(line, xi[0], xi[1])
     signals.prediction_road[0], signals.prediction_road[1] = s, d
 
@@ -59,14 +61,13 @@ def predict_neighbours(scene: Record, traffic: np.ndarray, line: np.ndarray, tau
         tau: horizon [s].
         predicted: rows ``[present, s, v]``, written, shape (3, 3).
     """
-    xi = np.empty(6)
     for i in range(3):
         predicted[i, 0] = scene.neighbours[i, PRESENT]
         if scene.neighbours[i, PRESENT] > 0.0:
             o = traffic[int(scene.neighbours[i, NEAR_ROW])]
-            ctra(o[X], o[Y], o[HEADING], o[SPEED], o[ACCELERATION], o[YAW_RATE], tau, xi)
-            predicted[i, 1] = locate(line, xi[0], xi[1])[0]
-            predicted[i, 2] = xi[3]
+            x, y, _, v, _, _ = ctra(o[X], o[Y], o[HEADING], o[SPEED], o[ACCELERATION], o[YAW_RATE], tau)
+            predicted[i, 1] = locate(line, x, y)[0]
+            predicted[i, 2] = v
 
 
 @jit_inlined
@@ -78,13 +79,12 @@ def assess(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, 
         traffic: other vehicles, shape (n, 8).
         line: reference line.
         p: parameters.
-        signals: ``prediction``, ``prediction_road``, ``r_x`` and ``r_y`` are written.
+        signals: ``prediction``, ``prediction_road``, ``predicted_neighbours``, ``r_x`` and ``r_y`` are written.
     """
     predict_ego(scene, signals.u_a_f, line, p, signals)
-    predicted = np.empty((3, 3))
-    predict_neighbours(scene, traffic, line, p.task.tau_p, predicted)
+    predict_neighbours(scene, traffic, line, p.task.tau_p, signals.predicted_neighbours)
     s, d = signals.prediction_road[0], signals.prediction_road[1]
     signals.r_y = lateral_risk(scene.area, s, d, p.lateral)
     signals.r_x = longitudinal_risk(
-        s, signals.prediction[3], predicted, p.vehicle.length, scene.changing, p.longitudinal
+        s, signals.prediction[3], signals.predicted_neighbours, p.vehicle.length, scene.changing, p.longitudinal
     )

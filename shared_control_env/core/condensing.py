@@ -22,6 +22,7 @@ WORKSPACE = np.dtype(
         ("z_next", np.float64, (6,)),
         ("A", np.float64, (6, 6)),  # derivatives of one step
         ("B", np.float64, (6, 2)),
+        ("affine", np.float64, (6,)),  # of one step linearised, A z + B u + affine
         ("sensitivity", np.float64, (6, _N)),  # derivative of the state with respect to U
         ("sensitivity_next", np.float64, (6, _N)),
         ("row", np.float64, (_N,)),  # derivative of one residual

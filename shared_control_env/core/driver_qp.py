@@ -65,14 +65,13 @@ def build_program(
     n = 2 * w.H_c
     H_p = w.H_p
     z, z_next = work.z, work.z_next
-    sens, sens_next = work.sensitivity, work.sensitivity_next
+    sens, sens_next, affine = work.sensitivity, work.sensitivity_next, work.affine
     clear(work, n)
     for i in range(6):
         z[i] = scene.z[i]
     # A command that would stop the car within the step hides that it can start off: linearise at rest.
     a = max(u_last[0], -z[V_X] / dt - z[R] * z[V_Y])
     delta = u_last[1]
-    affine = np.empty(6)
     for i in range(2 * H_p + n + 1):
         for c in range(n + 1):
             A[i, c] = 0.0

@@ -13,7 +13,7 @@ from math import cos, sin
 
 import numpy as np
 
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_allocating
 from shared_control_env.core.parameters import VehicleParameters
 
 S, Y, PSI, V_X, V_Y, R = range(6)
@@ -23,7 +23,7 @@ PLANT_SUBSTEPS = 2
 """Extrapolated substeps of one 0.05 s plant step; the error against an exact solution is in the tests."""
 
 
-@jit
+@jit_allocating
 def derivative(z: np.ndarray, a: float, delta: float, kappa: float, vehicle: VehicleParameters) -> np.ndarray:
     """Right-hand side of Eq. 11 in the road frame.
 

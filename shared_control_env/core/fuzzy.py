@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.jit import jit, jit_inlined
+from shared_control_env.core.jit import jit, jit_allocating, jit_inlined
 
 OPERATORS = ("product-sum", "min-max")
 """Names of the inference operators; an operator's index is its code in compiled functions."""
@@ -90,7 +90,7 @@ def centroid_product_sum(r_x: float, r_y: float) -> float:
     return moment / mass
 
 
-@jit
+@jit_allocating
 def centroid_min_max(r_x: float, r_y: float) -> float:
     """Centre of gravity with minimum for "and" and implication, maximum for aggregation.
 

@@ -29,6 +29,11 @@ def jit(function: F) -> F:
     return _compile(function, inline="never")
 
 
+def jit_allocating(function: F) -> F:
+    """As :func:`jit`, for a function that makes arrays."""
+    return _compile(function, inline="never", allocating=True)
+
+
 def jit_inlined(function: F) -> F:
     """As :func:`jit`, for a function that one or two others call: it is compiled as a part of them.
 
@@ -38,13 +43,15 @@ def jit_inlined(function: F) -> F:
     return _compile(function, inline="always")
 
 
-def _compile(function: F, inline: str) -> F:
+def _compile(function: F, inline: str, allocating: bool = False) -> F:
     options: dict[str, Any] = {
         "cache": True,
         "error_model": "numpy",
         "nogil": True,
         "inline": inline,
         "no_cfunc_wrapper": True,
+        # Arrays are made nowhere in the step path, so that nobody needs to count who holds them.
+        "_nrt": allocating,
         # A private function is never called from Python, so it needs no entry for that.
         "no_cpython_wrapper": function.__name__.startswith("_"),
     }

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import cos, sin
 
-import numpy as np
-
 from shared_control_env.core.jit import jit
 
 _SERIES_BELOW = 1e-2
@@ -42,7 +40,9 @@ def turn_integrals(theta: float) -> tuple[float, float, float, float]:
 
 
 @jit
-def ctra(x: float, y: float, psi: float, v: float, a: float, r: float, tau: float, xi: np.ndarray) -> None:
+def ctra(
+    x: float, y: float, psi: float, v: float, a: float, r: float, tau: float
+) -> tuple[float, float, float, float, float, float]:
     """Predict a vehicle over tau under constant acceleration and yaw rate (Eq. 1).
 
     ::
@@ -58,7 +58,9 @@ def ctra(x: float, y: float, psi: float, v: float, a: float, r: float, tau: floa
         a: acceleration [m/s^2].
         r: yaw rate [rad/s].
         tau: horizon [s].
-        xi: written: ``[x, y, psi, v, a, r]`` after tau, shape (6,).
+
+    Returns:
+        ``xi = x, y, psi, v, a, r`` after tau.
     """
     if v + a * tau < 0.0:
         tau = -v / a
@@ -66,9 +68,4 @@ def ctra(x: float, y: float, psi: float, v: float, a: float, r: float, tau: floa
     along = tau * (v * c0 + a * tau * c1)
     across = tau * (v * s0 + a * tau * s1)
     cp, sp = cos(psi), sin(psi)
-    xi[0] = x + cp * along - sp * across
-    xi[1] = y + sp * along + cp * across
-    xi[2] = psi + r * tau
-    xi[3] = max(0.0, v + a * tau)
-    xi[4] = a
-    xi[5] = r
+    return x + cp * along - sp * across, y + sp * along + cp * across, psi + r * tau, max(0.0, v + a * tau), a, r

@@ -91,6 +91,7 @@ SIGNALS = np.dtype(
         ("misperception", np.float64, (2,)),  # of the automation: lane offset [m], 1 where it misses its lead
         ("prediction", np.float64, (6,)),  # xi = [x, y, psi, v, a, r] after tau_p, Cartesian frame
         ("prediction_road", np.float64, (2,)),  # its (s, d) [m]
+        ("predicted_neighbours", np.float64, (3, 3)),  # after tau_p: 1 if there is one, s [m], speed [m/s]
         ("r_x", np.float64),  # longitudinal risk
         ("r_y", np.float64),  # lateral risk
         ("alpha_a", np.float64),  # authority of the automation

@@ -14,7 +14,7 @@ from math import hypot
 import numpy as np
 import shapely
 
-from shared_control_env.core.jit import jit, jit_inlined
+from shared_control_env.core.jit import jit, jit_allocating, jit_inlined
 from shared_control_env.core.records import MAX_CHAIN, Record
 
 REACHED, BLOCKED = 0, 1
@@ -73,7 +73,7 @@ def whole_region(region: np.ndarray, area: Record) -> None:
     area.start, area.end, area.outcome = region[0], region[1], REACHED
 
 
-@jit
+@jit_allocating
 def search_triangles(triangles: np.ndarray, start: float, end: float, d: float, min_width: float, area: Record) -> None:
     """Sequence of triangles from the ego to the final region, and its boundaries (Table I, steps 2-4).
 
@@ -136,7 +136,7 @@ def _same_edge(triangles: np.ndarray, i: int, edge: int, j: int) -> int:
     return -1
 
 
-@jit
+@jit_allocating
 def adjacency(triangles: np.ndarray) -> np.ndarray:
     """Adjacency (Table I, step 3) as a list: ``[i, edge]`` is the triangle over that edge, or -1.
 
@@ -181,7 +181,7 @@ def _edge_distance(triangles: np.ndarray, i: int, edge: int, s: float, d: float)
     return hypot(s - a[0] - along * es, d - a[1] - along * ed)
 
 
-@jit
+@jit_allocating
 def clearance(
     triangles: np.ndarray, neighbours: np.ndarray, i: int, entry: int, leave: int, start: float, end: float
 ) -> float:
@@ -227,7 +227,7 @@ def clearance(
     return width
 
 
-@jit
+@jit_allocating
 def _search(
     triangles: np.ndarray,
     neighbours: np.ndarray,

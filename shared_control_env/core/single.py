@@ -24,7 +24,7 @@ from shared_control_env.core import (
 from shared_control_env.core import (
     traffic as vehicles,
 )
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_allocating
 from shared_control_env.core.records import Record
 
 
@@ -172,7 +172,7 @@ def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: i
     info.note_signals(scene[()], signals[()], faults, failures, info_record[()])
 
 
-@jit
+@jit_allocating
 def note_start(scene: Record, parameters: Record, memory: Record, info_record: Record) -> None:
     """:func:`info.note_outcome` of a reset, with zero reward terms."""
     s = scene[()]

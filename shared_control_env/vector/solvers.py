@@ -42,7 +42,7 @@ class Solver:
     @cached_property
     def address(self) -> int:
         """Where it is in memory; it is compiled for that, or read from numba's cache."""
-        compiled: Any = cfunc(self._signature, cache=True, error_model="numpy")(self._function)
+        compiled: Any = cfunc(self._signature, cache=True, error_model="numpy", _nrt=False)(self._function)
         self._compiled = compiled  # lest its code is freed
         return compiled.address
 

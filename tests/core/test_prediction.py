@@ -10,9 +10,7 @@ finite = lambda low, high: st.floats(low, high, allow_nan=False)
 
 
 def predict(x, y, psi, v, a, r, tau):
-    xi = np.empty(6)
-    ctra(x, y, psi, v, a, r, tau, xi)
-    return xi
+    return np.array(ctra(x, y, psi, v, a, r, tau))
 
 
 def integrate(psi, v, a, r, tau):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from math import cos, sin
+
 import numpy as np
 
-from shared_control_env.core.dynamics import V_X, R, implicit_step
+from shared_control_env.core.dynamics import PSI, V_X, R, implicit_step
 from shared_control_env.core.jit import jit_inlined
 from shared_control_env.core.lateral_risk import lateral_risk
 from shared_control_env.core.longitudinal_risk import longitudinal_risk
@@ -42,7 +44,8 @@ def predict_ego(scene: Record, u_f: np.ndarray, line: np.ndarray, p: Parameters,
     """
     state = scene.state
     xi = signals.prediction
-    implicit_step(state, u_f[0], u_f[1], 0.0, p.task.dt, p.vehicle, xi)
+    heading, wheel = (cos(state[PSI]), sin(state[PSI])), (cos(u_f[1]), sin(u_f[1]))
+    implicit_step(state, heading, u_f[0], u_f[1], wheel, 0.0, p.task.dt, p.vehicle, xi)
     xi[0], xi[1], xi[2], xi[3], xi[4], xi[5] = ctra(
         state[0], state[1], state[2], state[V_X], u_f[0], xi[R], p.task.tau_p
     )

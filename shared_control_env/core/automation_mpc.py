@@ -6,11 +6,13 @@ implicit model, solves the box-bounded quadratic program for a step and searches
 
 from __future__ import annotations
 
+from math import cos, sin
+
 import numpy as np
 
 from shared_control_env.core.box_qp import solve_box_qp
 from shared_control_env.core.condensing import add_effort, add_square, add_tracking, clear, propagate
-from shared_control_env.core.dynamics import V_X, R, S, Y, implicit_step, implicit_step_jacobian
+from shared_control_env.core.dynamics import PSI, V_X, R, S, Y, implicit_step, implicit_step_jacobian
 from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.lateral_risk import continuous_field
 from shared_control_env.core.parameters import Limits, Parameters
@@ -50,10 +52,14 @@ def cost(U: np.ndarray, scene: Record, p: Parameters, work: Record) -> float:
     z, z_next = work.z, work.z_next
     for i in range(6):
         z[i] = scene.z[i]
+    heading = cos(z[PSI]), sin(z[PSI])
+    wheel = heading
     total = 0.0
     for i in range(w.H_p):
         j = min(i, w.H_c - 1)
-        implicit_step(z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next)
+        if i == j:
+            wheel = cos(U[j, 1]), sin(U[j, 1])
+        heading = implicit_step(z, heading, U[j, 0], U[j, 1], wheel, scene.kappa[i], p.task.dt, p.vehicle, z_next)
         P = continuous_field(scene.area, z_next[S], z_next[Y], p.lateral)[0]
         yaw_acceleration = (z_next[R] - z[R]) / p.task.dt
         total += (
@@ -80,24 +86,29 @@ def linearise(U: np.ndarray, scene: Record, p: Parameters, work: Record) -> floa
     """
     w = p.automation
     z, z_next = work.z, work.z_next
-    sens, sens_next = work.sensitivity, work.sensitivity_next
+    sens = work.sensitivity
     clear(work, 2 * w.H_c)
     for i in range(6):
         z[i] = scene.z[i]
+    heading = cos(z[PSI]), sin(z[PSI])
+    wheel = heading
     total = 0.0
     for i in range(w.H_p):
         j = min(i, w.H_c - 1)
         n = 2 * j + 2
-        implicit_step_jacobian(z, U[j, 0], U[j, 1], scene.kappa[i], p.task.dt, p.vehicle, z_next, work.A, work.B)
-        propagate(work.A, work.B, sens, sens_next, n)
-        total += add_tracking(work, w, p.task.dt, z, z_next, sens, sens_next, scene.y_target, scene.v_target, n)
+        if i == j:
+            wheel = cos(U[j, 1]), sin(U[j, 1])
+        heading = implicit_step_jacobian(
+            z, heading, U[j, 0], U[j, 1], wheel, scene.kappa[i], p.task.dt, p.vehicle, z_next, work.A, work.B
+        )
+        propagate(work, n)
+        total += add_tracking(work, w, p.task.dt, z, z_next, scene.y_target, scene.v_target, n)
         P, P_s, P_d = continuous_field(scene.area, z_next[S], z_next[Y], p.lateral)
         if P > 0.0:
-            for c in range(n):
-                work.row[c] = P_s * sens_next[S, c] + P_d * sens_next[Y, c]
+            for c in range(work.row.shape[0]):
+                work.row[c] = P_s * sens[S, c] + P_d * sens[Y, c]
             total += add_square(work, w.R, P, n)
         z, z_next = z_next, z
-        sens, sens_next = sens_next, sens
     return total + add_effort(work, w, U)
 
 

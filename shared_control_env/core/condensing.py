@@ -16,6 +16,9 @@ from shared_control_env.core.records import MAX_CONTROL, Record
 
 _N = 2 * MAX_CONTROL
 
+_LANES = 4
+"""Loops run over whole fours of columns, of which LLVM makes vector instructions; those beyond n are zero."""
+
 WORKSPACE = np.dtype(
     [
         ("z", np.float64, (6,)),  # states along the rollout
@@ -24,7 +27,7 @@ WORKSPACE = np.dtype(
         ("B", np.float64, (6, 2)),
         ("affine", np.float64, (6,)),  # of one step linearised, A z + B u + affine
         ("sensitivity", np.float64, (6, _N)),  # derivative of the state with respect to U
-        ("sensitivity_next", np.float64, (6, _N)),
+        ("yaw_step", np.float64, (_N,)),  # the same of the change of the yaw rate over the last step
         ("row", np.float64, (_N,)),  # derivative of one residual
         ("gradient", np.float64, (_N,)),  # of half the cost
         ("hessian", np.float64, (_N, _N)),  # Gauss-Newton, of half the cost
@@ -44,44 +47,59 @@ WORKSPACE = np.dtype(
 @jit
 def clear(work: Record, n: int) -> None:
     """Start a condensation of n columns: zero gradient, Hessian and sensitivities of a :data:`WORKSPACE` record."""
-    for c in range(n):
-        work.gradient[c] = 0.0
-        for e in range(n):
+    for c in range(_whole_lanes(n)):
+        work.gradient[c] = work.yaw_step[c] = 0.0
+        for e in range(_whole_lanes(n)):
             work.hessian[c, e] = 0.0
         for i in range(6):
-            work.sensitivity[i, c] = work.sensitivity_next[i, c] = 0.0
+            work.sensitivity[i, c] = 0.0
 
 
 @jit
-def propagate(A: np.ndarray, B: np.ndarray, sens: np.ndarray, sens_next: np.ndarray, n: int) -> None:
-    """Sensitivity of the next state, ``A sens`` plus B in the last two of the n columns in play.
+def _whole_lanes(n: int) -> int:
+    """Columns up to which a loop over n of them runs."""
+    return (n + _LANES - 1) // _LANES * _LANES
+
+
+@jit
+def propagate(work: Record, n: int) -> None:
+    """Carry the sensitivity over a step: ``A sens``, plus B in the last two of the n columns in play.
 
     Uses the zeros of A: nothing but s depends on s, and the velocities depend on velocities alone.
 
     Args:
-        A, B: derivatives of one step, shapes (6, 6) and (6, 2).
-        sens: sensitivity of the state, shape (6, >= n).
-        sens_next: written.
+        work: record of :data:`WORKSPACE`; ``A`` and ``B`` hold the step's derivatives, ``sensitivity`` and
+            ``yaw_step`` are written.
         n: columns in play: 2 for every command used so far.
     """
-    for c in range(n):
-        y, psi, v_x, v_y, r = sens[Y, c], sens[PSI, c], sens[V_X, c], sens[V_Y, c], sens[R, c]
-        for i in (V_X, V_Y, R):
-            sens_next[i, c] = A[i, V_X] * v_x + A[i, V_Y] * v_y + A[i, R] * r
-        for i in (S, Y, PSI):
-            sens_next[i, c] = A[i, Y] * y + A[i, PSI] * psi + A[i, V_X] * v_x + A[i, V_Y] * v_y + A[i, R] * r
-        sens_next[S, c] += sens[S, c]
-    for i in range(6):
-        sens_next[i, n - 2] += B[i, 0]
-        sens_next[i, n - 1] += B[i, 1]
+    A, B, sens, yaw_step = work.A, work.B, work.sensitivity, work.yaw_step
+    a_s = A[S, Y], A[S, PSI], A[S, V_X], A[S, V_Y], A[S, R]
+    a_y = A[Y, Y], A[Y, PSI], A[Y, V_X], A[Y, V_Y], A[Y, R]
+    a_psi = A[PSI, Y], A[PSI, PSI], A[PSI, V_X], A[PSI, V_Y], A[PSI, R]
+    a_vx = A[V_X, V_X], A[V_X, V_Y], A[V_X, R]
+    a_vy = A[V_Y, V_X], A[V_Y, V_Y], A[V_Y, R]
+    a_r = A[R, V_X], A[R, V_Y], A[R, R]
+    for c in range(_whole_lanes(n)):
+        s, y, psi, v_x, v_y, r = sens[S, c], sens[Y, c], sens[PSI, c], sens[V_X, c], sens[V_Y, c], sens[R, c]
+        sens[S, c] = s + a_s[0] * y + a_s[1] * psi + a_s[2] * v_x + a_s[3] * v_y + a_s[4] * r
+        sens[Y, c] = a_y[0] * y + a_y[1] * psi + a_y[2] * v_x + a_y[3] * v_y + a_y[4] * r
+        sens[PSI, c] = a_psi[0] * y + a_psi[1] * psi + a_psi[2] * v_x + a_psi[3] * v_y + a_psi[4] * r
+        sens[V_X, c] = a_vx[0] * v_x + a_vx[1] * v_y + a_vx[2] * r
+        sens[V_Y, c] = a_vy[0] * v_x + a_vy[1] * v_y + a_vy[2] * r
+        r_next = a_r[0] * v_x + a_r[1] * v_y + a_r[2] * r
+        sens[R, c], yaw_step[c] = r_next, r_next - r
+    for column in range(2):
+        for i in range(6):
+            sens[i, n - 2 + column] += B[i, column]
+        yaw_step[n - 2 + column] += B[R, column]
 
 
 @jit
 def add_square(work: Record, weight: float, residual: float, n: int) -> float:
-    """Add ``weight (residual + row . dU)^2`` to the model; fills the Hessian's lower triangle.
+    """Add ``weight (residual + row . dU)^2`` to the model.
 
     Args:
-        work: record of :data:`WORKSPACE`; ``row`` holds the residual's derivative.
+        work: record of :data:`WORKSPACE`; ``row`` holds the residual's derivative, zero beyond n.
         weight, residual: of the term.
         n: columns in play.
 
@@ -92,7 +110,7 @@ def add_square(work: Record, weight: float, residual: float, n: int) -> float:
     for c in range(n):
         scaled = weight * row[c]
         gradient[c] += scaled * residual
-        for e in range(c + 1):
+        for e in range(_whole_lanes(n)):
             hessian[c, e] += scaled * row[e]
     return weight * residual * residual
 
@@ -104,8 +122,6 @@ def add_tracking(
     dt: float,
     z: np.ndarray,
     z_next: np.ndarray,
-    sens: np.ndarray,
-    sens_next: np.ndarray,
     y_target: float,
     v_target: float,
     n: int,
@@ -116,32 +132,30 @@ def add_tracking(
     for the implicit step.
 
     Args:
-        work: record of :data:`WORKSPACE`.
+        work: record of :data:`WORKSPACE`, its ``sensitivity`` and ``yaw_step`` those after the stage.
         weights: W, H and N.
         dt: step [s].
         z, z_next: state before and after the stage, shape (6,).
-        sens, sens_next: their sensitivities.
         y_target, v_target: lateral position [m] and speed [m/s] to track.
         n: columns in play.
 
     Returns:
         The terms' value.
     """
-    gradient, hessian = work.gradient, work.hessian
-    y_error, v_error = z_next[Y] - y_target, z_next[V_X] - v_target
-    yaw_acceleration = (z_next[R] - z[R]) / dt
+    gradient, hessian, sens, yaw_step = work.gradient, work.hessian, work.sensitivity, work.yaw_step
+    W, H, N = weights.W, weights.H, weights.N / (dt * dt)
+    y_error, v_error, r_change = z_next[Y] - y_target, z_next[V_X] - v_target, z_next[R] - z[R]
     for c in range(n):
-        wy, wv = weights.W * sens_next[Y, c], weights.H * sens_next[V_X, c]
-        wr = weights.N * (sens_next[R, c] - sens[R, c]) / (dt * dt)
-        gradient[c] += wy * y_error + wv * v_error + wr * yaw_acceleration * dt
-        for e in range(c + 1):
-            hessian[c, e] += wy * sens_next[Y, e] + wv * sens_next[V_X, e] + wr * (sens_next[R, e] - sens[R, e])
-    return weights.W * y_error**2 + weights.H * v_error**2 + weights.N * yaw_acceleration**2
+        w_y, w_v, w_r = W * sens[Y, c], H * sens[V_X, c], N * yaw_step[c]
+        gradient[c] += w_y * y_error + w_v * v_error + w_r * r_change
+        for e in range(_whole_lanes(n)):
+            hessian[c, e] += w_y * sens[Y, e] + w_v * sens[V_X, e] + w_r * yaw_step[e]
+    return W * y_error**2 + H * v_error**2 + N * r_change**2
 
 
 @jit
 def add_effort(work: Record, weights: PredictiveParameters, U: np.ndarray) -> float:
-    """Add the effort ``sum_j Q_a a(j)^2 + Q_delta delta(j)^2`` and complete the symmetric Hessian; return its value."""
+    """Add the effort ``sum_j Q_a a(j)^2 + Q_delta delta(j)^2`` of the commands; return its value."""
     value = 0.0
     for j in range(weights.H_c):
         for channel in range(2):
@@ -150,7 +164,4 @@ def add_effort(work: Record, weights: PredictiveParameters, U: np.ndarray) -> fl
             work.gradient[c] += weight * U[j, channel]
             work.hessian[c, c] += weight
             value += weight * U[j, channel] ** 2
-    for c in range(2 * weights.H_c):
-        for e in range(c):
-            work.hessian[e, c] = work.hessian[c, e]
     return value

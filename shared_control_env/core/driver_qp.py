@@ -13,10 +13,12 @@ the program is always feasible, and eps is 0 where the rows can be kept at a cos
 
 from __future__ import annotations
 
+from math import cos, sin
+
 import numpy as np
 
 from shared_control_env.core.condensing import add_effort, add_tracking, clear, propagate
-from shared_control_env.core.dynamics import V_X, V_Y, R, S, Y, implicit_step_jacobian
+from shared_control_env.core.dynamics import PSI, V_X, V_Y, R, S, Y, implicit_step_jacobian
 from shared_control_env.core.jit import jit_inlined
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import Record
@@ -65,13 +67,14 @@ def build_program(
     n = 2 * w.H_c
     H_p = w.H_p
     z, z_next = work.z, work.z_next
-    sens, sens_next, affine = work.sensitivity, work.sensitivity_next, work.affine
+    sens, affine = work.sensitivity, work.affine
     clear(work, n)
     for i in range(6):
         z[i] = scene.z[i]
     # A command that would stop the car within the step hides that it can start off: linearise at rest.
     a = max(u_last[0], -z[V_X] / dt - z[R] * z[V_Y])
     delta = u_last[1]
+    heading, wheel = (cos(scene.z[PSI]), sin(scene.z[PSI])), (cos(delta), sin(delta))
     for i in range(2 * H_p + n + 1):
         for c in range(n + 1):
             A[i, c] = 0.0
@@ -79,7 +82,9 @@ def build_program(
         columns = 2 * min(i, w.H_c - 1) + 2
         # z(i+1) = A z(i) + B u(i) + affine, with A, B and affine at the current state; they vary with kappa alone.
         if i == 0 or scene.kappa[i] != scene.kappa[i - 1]:
-            implicit_step_jacobian(scene.z, a, delta, scene.kappa[i], dt, p.vehicle, affine, work.A, work.B)
+            implicit_step_jacobian(
+                scene.z, heading, a, delta, wheel, scene.kappa[i], dt, p.vehicle, affine, work.A, work.B
+            )
             for j in range(6):
                 for m in range(6):
                     affine[j] -= work.A[j, m] * scene.z[m]
@@ -88,21 +93,20 @@ def build_program(
             z_next[j] = affine[j]
             for m in range(6):
                 z_next[j] += work.A[j, m] * z[m]
-        propagate(work.A, work.B, sens, sens_next, columns)
-        add_tracking(work, w, dt, z, z_next, sens, sens_next, scene.y_target, scene.v_target, columns)
+        propagate(work, columns)
+        add_tracking(work, w, dt, z, z_next, scene.y_target, scene.v_target, columns)
         # The rows of C are taken where the car gets to under the last command.
         station = z_next[S]
         for c in range(columns):
-            station += sens_next[S, c] * (a if c % 2 == 0 else delta)
+            station += sens[S, c] * (a if c % 2 == 0 else delta)
             bound = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
-            A[i, c] = sens_next[Y, c] * bound
+            A[i, c] = sens[Y, c] * bound
             A[H_p + i, c] = A[i, c]
         lower, upper = lateral_bounds(scene.area, station)
         A[i, n], A[H_p + i, n] = -1.0, 1.0
         low[i], high[i] = -UNBOUNDED, upper - z_next[Y]
         low[H_p + i], high[H_p + i] = lower - z_next[Y], UNBOUNDED
         z, z_next = z_next, z
-        sens, sens_next = sens_next, sens
     for j in range(w.H_c):
         work.trial[j, 0] = work.trial[j, 1] = 0.0
     add_effort(work, w, work.trial)

@@ -10,6 +10,7 @@ Axes follow ISO 8855: x forward, y to the left, positive steering and yaw rate t
 from __future__ import annotations
 
 from math import cos, sin
+from typing import TypeAlias
 
 import numpy as np
 
@@ -21,6 +22,9 @@ S, Y, PSI, V_X, V_Y, R = range(6)
 
 PLANT_SUBSTEPS = 2
 """Extrapolated substeps of one 0.05 s plant step; the error against an exact solution is in the tests."""
+
+Direction: TypeAlias = tuple[float, float]
+"""Cosine and sine of an angle."""
 
 
 @jit_allocating
@@ -64,13 +68,15 @@ def derivative(z: np.ndarray, a: float, delta: float, kappa: float, vehicle: Veh
 @jit
 def implicit_step(
     z: np.ndarray,
+    heading: Direction,
     a: float,
     delta: float,
+    wheel: Direction,
     kappa: float,
     h: float,
     vehicle: VehicleParameters,
     z_next: np.ndarray,
-) -> None:
+) -> Direction:
     """One step of length h, implicit in the lateral motion: the discrete model f^d of Eq. 12.
 
     One explicit 0.05 s step is unstable below about 15 m/s (yaw damping grows as 1/v_x), and the slip
@@ -88,91 +94,108 @@ def implicit_step(
         psi+  = psi + h (r+ - kappa s')        s+ = s + h s'
         y+    = y + h (v sin(psi+) + v_y+ cos(psi+))
 
-    with ``K = 2 C`` an axle and ``c = cos(delta)``. First order in h.
+    with ``K = 2 C`` an axle and ``c = cos(delta)``. First order in h. Sines and cosines are handed on from step to
+    step, since they cost as much as all the rest.
 
     Args:
         z: state, shape (6,).
+        heading: cosine and sine of psi.
         a: acceleration [m/s^2].
         delta: front steering angle [rad].
+        wheel: cosine and sine of delta.
         kappa: curvature of the path [1/m].
         h: step [s].
         vehicle: parameters.
         z_next: the new state is written here, shape (6,); may be ``z`` itself.
+
+    Returns:
+        Cosine and sine of the new psi.
     """
-    y, psi, v_y, r = z[Y], z[PSI], z[V_Y], z[R]
-    v = max(0.0, z[V_X] + h * (a + r * v_y))
-    m11, m12, m21, m22, b1, b2 = _lateral_system(v, v_y, r, delta, h, vehicle)
-    det = m11 * m22 - m12 * m21
-    v_y_next = (b1 * m22 - b2 * m12) / det
-    r_next = (b2 * m11 - b1 * m21) / det
-    s_rate = (v * cos(psi) - v_y_next * sin(psi)) / (1.0 - kappa * y)
-    psi_next = psi + h * (r_next - kappa * s_rate)
-    z_next[S] = z[S] + h * s_rate
-    z_next[Y] = y + h * (v * sin(psi_next) + v_y_next * cos(psi_next))
-    z_next[PSI] = psi_next
-    z_next[V_X] = v
-    z_next[V_Y] = v_y_next
-    z_next[R] = r_next
+    (v, v_y, r), _ = _step_velocities(z, a, delta, wheel, h, vehicle)
+    heading, _ = _step_pose(z, heading, v, v_y, r, kappa, h, z_next)
+    z_next[V_X], z_next[V_Y], z_next[R] = v, v_y, r
+    return heading
 
 
 @jit
-def _lateral_system(
-    v: float, v_y: float, r: float, delta: float, h: float, vehicle: VehicleParameters
-) -> tuple[float, float, float, float, float, float]:
-    """Matrix and right-hand side of the two lateral equations of :func:`implicit_step`."""
-    K_f, K_r = 2.0 * vehicle.C_f, 2.0 * vehicle.C_r
-    l_f, l_r, m, I_z = vehicle.l_f, vehicle.l_r, vehicle.m, vehicle.I_z
-    K_fc = K_f * cos(delta)
-    m11 = v + h * (K_fc + K_r) / m
-    m12 = h * (v * v + (K_fc * l_f - K_r * l_r) / m)
-    m21 = h * (l_f * K_f - l_r * K_r) / I_z
-    m22 = v + h * (l_f * l_f * K_f + l_r * l_r * K_r) / I_z
-    b1 = v * v_y + h * K_fc * delta * v / m
-    b2 = v * r + h * l_f * K_f * delta * v / I_z
-    return m11, m12, m21, m22, b1, b2
+def _step_velocities(
+    z: np.ndarray, a: float, delta: float, wheel: Direction, h: float, vehicle: VehicleParameters
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    """New speed, lateral velocity and yaw rate of :func:`implicit_step`, which solve ``M [v_y+, r+] = b``; M^-1."""
+    v_y, r = z[V_Y], z[R]
+    v = max(0.0, z[V_X] + h * (a + r * v_y))
+    K_f, K_r, l_f, l_r = 2.0 * vehicle.C_f, 2.0 * vehicle.C_r, vehicle.l_f, vehicle.l_r
+    K_fc, h_m, h_I = K_f * wheel[0], h / vehicle.m, h / vehicle.I_z
+    m11 = v + h_m * (K_fc + K_r)
+    m12 = h * v * v + h_m * (K_fc * l_f - K_r * l_r)
+    m21 = h_I * (l_f * K_f - l_r * K_r)
+    m22 = v + h_I * (l_f * l_f * K_f + l_r * l_r * K_r)
+    b1 = v * v_y + h_m * K_fc * delta * v
+    b2 = v * r + h_I * l_f * K_f * delta * v
+    scale = 1.0 / (m11 * m22 - m12 * m21)
+    i11, i12, i21, i22 = m22 * scale, -m12 * scale, -m21 * scale, m11 * scale
+    return (v, i11 * b1 + i12 * b2, i21 * b1 + i22 * b2), (i11, i12, i21, i22)
+
+
+@jit
+def _step_pose(
+    z: np.ndarray, heading: Direction, v: float, v_y: float, r: float, kappa: float, h: float, z_next: np.ndarray
+) -> tuple[Direction, float]:
+    """New pose of :func:`implicit_step` under the new velocities; cosine and sine of the new psi, and s'."""
+    s, y, psi = z[S], z[Y], z[PSI]
+    s_rate = (v * heading[0] - v_y * heading[1]) / (1.0 - kappa * y)
+    psi += h * (r - kappa * s_rate)
+    heading = cos(psi), sin(psi)
+    z_next[S] = s + h * s_rate
+    z_next[Y] = y + h * (v * heading[1] + v_y * heading[0])
+    z_next[PSI] = psi
+    return heading, s_rate
 
 
 @jit
 def implicit_step_jacobian(
     z: np.ndarray,
+    heading: Direction,
     a: float,
     delta: float,
+    wheel: Direction,
     kappa: float,
     h: float,
     vehicle: VehicleParameters,
     z_next: np.ndarray,
     A: np.ndarray,
     B: np.ndarray,
-) -> None:
+) -> Direction:
     """:func:`implicit_step` with its derivatives ``A = dz+/dz`` and ``B = dz+/d[a, delta]``.
 
     The lateral pair solves ``M x = b``; its derivative solves ``M dx = db - dM x``. Where braking holds
     the speed at zero its derivatives vanish.
 
     Args:
-        z, a, delta, kappa, h, vehicle, z_next: as in :func:`implicit_step`.
+        z, heading, a, delta, wheel, kappa, h, vehicle, z_next: as in :func:`implicit_step`.
         A: written, shape (6, 6).
         B: written, shape (6, 2).
+
+    Returns:
+        Cosine and sine of the new psi.
     """
-    # Read before the step may overwrite it, so that the compiler need not repeat the step's sines.
-    y, psi, v_x, v_y, r = z[Y], z[PSI], z[V_X], z[V_Y], z[R]
-    implicit_step(z, a, delta, kappa, h, vehicle, z_next)
-    v, v_y1, r1, psi1 = z_next[V_X], z_next[V_Y], z_next[R], z_next[PSI]
+    y, v_x, v_y, r = z[Y], z[V_X], z[V_Y], z[R]
+    (v, v_y1, r1), (i11, i12, i21, i22) = _step_velocities(z, a, delta, wheel, h, vehicle)
+    heading1, s_rate = _step_pose(z, heading, v, v_y1, r1, kappa, h, z_next)
+    z_next[V_X], z_next[V_Y], z_next[R] = v, v_y1, r1
     # At rest the derivative is that of starting off, or a controller would never start.
     moving = 1.0 if v_x + h * (a + r * v_y) >= 0.0 else 0.0
-    m11, m12, m21, m22, _, _ = _lateral_system(v, v_y, r, delta, h, vehicle)
-    det = m11 * m22 - m12 * m21
-    K_f, c, sn = 2.0 * vehicle.C_f, cos(delta), sin(delta)
+    K_f, c, sn, h_m, h_I = 2.0 * vehicle.C_f, wheel[0], wheel[1], h / vehicle.m, h / vehicle.I_z
 
     # Derivatives of (v_y+, r+) with respect to the new speed v, then v_y, r and delta.
-    e1 = v_y + h * K_f * c * delta / vehicle.m - v_y1 - 2.0 * h * v * r1
-    e2 = r + h * vehicle.l_f * K_f * delta / vehicle.I_z - r1
-    V_v, R_v = (e1 * m22 - e2 * m12) / det, (e2 * m11 - e1 * m21) / det
-    V_vy, R_vy = v * m22 / det, -v * m21 / det
-    V_r, R_r = -v * m12 / det, v * m11 / det
-    e1 = h * K_f / vehicle.m * (v * (c - delta * sn) + sn * (v_y1 + vehicle.l_f * r1))
-    e2 = h * vehicle.l_f * K_f * v / vehicle.I_z
-    V_d, R_d = (e1 * m22 - e2 * m12) / det, (e2 * m11 - e1 * m21) / det
+    e1 = v_y + h_m * K_f * c * delta - v_y1 - 2.0 * h * v * r1
+    e2 = r + h_I * vehicle.l_f * K_f * delta - r1
+    V_v, R_v = i11 * e1 + i12 * e2, i21 * e1 + i22 * e2
+    V_vy, R_vy = i11 * v, i21 * v
+    V_r, R_r = i12 * v, i22 * v
+    e1 = h_m * K_f * (v * (c - delta * sn) + sn * (v_y1 + vehicle.l_f * r1))
+    e2 = h_I * vehicle.l_f * K_f * v
+    V_d, R_d = i11 * e1 + i12 * e2, i21 * e1 + i22 * e2
 
     for i in range(6):
         for j in range(6):
@@ -185,12 +208,11 @@ def implicit_step_jacobian(
     B[V_Y, 0], B[V_Y, 1], B[R, 0], B[R, 1] = V_v * v_a, V_d, R_v * v_a, R_d
 
     # s', psi+ and y+ by the chain rule through v, v_y+ and r+.
-    q = 1.0 - kappa * y
-    cp, sp = cos(psi), sin(psi)
-    s_rate = (v * cp - v_y1 * sp) / q
-    s_rate_y = kappa * s_rate / q
-    s_rate_psi = -(v * sp + v_y1 * cp) / q
-    cp1, sp1 = cos(psi1), sin(psi1)
+    stretch = 1.0 / (1.0 - kappa * y)
+    cp, sp = heading
+    cp1, sp1 = heading1
+    s_rate_y = kappa * s_rate * stretch
+    s_rate_psi = -(v * sp + v_y1 * cp) * stretch
     y_psi1 = v * cp1 - v_y1 * sp1
     A[S, S], A[Y, Y], A[PSI, PSI] = 1.0, 1.0, 1.0
     A[S, Y], A[S, PSI] = h * s_rate_y, h * s_rate_psi
@@ -198,15 +220,16 @@ def implicit_step_jacobian(
     A[Y, Y] += h * y_psi1 * A[PSI, Y]
     A[Y, PSI] = h * y_psi1 * A[PSI, PSI]
     for j in (V_X, V_Y, R):
-        ds = (A[V_X, j] * cp - A[V_Y, j] * sp) / q
+        ds = (A[V_X, j] * cp - A[V_Y, j] * sp) * stretch
         A[S, j] = h * ds
         A[PSI, j] = h * (A[R, j] - kappa * ds)
         A[Y, j] = h * (A[V_X, j] * sp1 + A[V_Y, j] * cp1 + y_psi1 * A[PSI, j])
     for j in range(2):
-        ds = (B[V_X, j] * cp - B[V_Y, j] * sp) / q
+        ds = (B[V_X, j] * cp - B[V_Y, j] * sp) * stretch
         B[S, j] = h * ds
         B[PSI, j] = h * (B[R, j] - kappa * ds)
         B[Y, j] = h * (B[V_X, j] * sp1 + B[V_Y, j] * cp1 + y_psi1 * B[PSI, j])
+    return heading1
 
 
 @jit
@@ -226,9 +249,10 @@ def extrapolated_step(
         work: scratch, shape (2, 6).
     """
     coarse, fine = work[0], work[1]
-    implicit_step(z, a, delta, 0.0, h, vehicle, coarse)
-    implicit_step(z, a, delta, 0.0, 0.5 * h, vehicle, fine)
-    implicit_step(fine, a, delta, 0.0, 0.5 * h, vehicle, fine)
+    heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
+    implicit_step(z, heading, a, delta, wheel, 0.0, h, vehicle, coarse)
+    heading = implicit_step(z, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, fine)
+    implicit_step(fine, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, fine)
     for i in range(6):
         z[i] = 2.0 * fine[i] - coarse[i]
     z[V_X] = max(0.0, z[V_X])

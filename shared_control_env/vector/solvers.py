@@ -42,7 +42,8 @@ class Solver:
     @cached_property
     def address(self) -> int:
         """Where it is in memory; it is compiled for that, or read from numba's cache."""
-        compiled: Any = cfunc(self._signature, cache=True, error_model="numpy", _nrt=False)(self._function)
+        options: Any = {"cache": True, "error_model": "numpy", "_nrt": False}  # as core.jit has them
+        compiled: Any = cfunc(self._signature, **options)(self._function)
         self._compiled = compiled  # lest its code is freed
         return compiled.address
 

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -50,6 +52,16 @@ def test_convergence_order(step, order, speed):
     assert slope == pytest.approx(order, abs=0.25)
 
 
+def direction(angle):
+    return math.cos(angle), math.sin(angle)
+
+
+def implicit_step(z, a, delta, kappa, h, z_next):
+    """One step, which also hands on the direction that the car then has."""
+    heading = dynamics.implicit_step(z, direction(z[2]), a, delta, direction(delta), kappa, h, VEHICLE, z_next)
+    assert heading == direction(z_next[2])
+
+
 def test_implicit_step_is_first_order():
     z0 = np.array([0.0, 0.3, 0.05, 15.0, 0.1, 0.05])
     reference = exact(z0, -1.0, 0.03, 0.5, kappa=1 / 60)
@@ -57,7 +69,7 @@ def test_implicit_step_is_first_order():
     for n in (100, 200, 400, 800):
         z = z0.copy()
         for _ in range(n):
-            dynamics.implicit_step(z, -1.0, 0.03, 1 / 60, 0.5 / n, VEHICLE, z)
+            implicit_step(z, -1.0, 0.03, 1 / 60, 0.5 / n, z)
         errors.append(np.abs(z - reference).max())
     slope = -np.polyfit(np.log([100, 200, 400, 800]), np.log(errors), 1)[0]
     assert slope == pytest.approx(1.0, abs=0.1)
@@ -121,12 +133,15 @@ def test_jacobian_matches_finite_differences():
 
         def step(q, kappa=kappa):
             out = np.empty(6)
-            dynamics.implicit_step(q[:6], q[6], q[7], kappa, 0.05, VEHICLE, out)
+            implicit_step(q[:6], q[6], q[7], kappa, 0.05, out)
             return out
 
         q = np.r_[z, a, delta]
         numeric = np.array([(step(q + e) - step(q - e)) / 2e-6 for e in 1e-6 * np.eye(8)]).T
-        dynamics.implicit_step_jacobian(z, a, delta, kappa, 0.05, VEHICLE, z_next, A, B)
+        heading = dynamics.implicit_step_jacobian(
+            z, direction(z[2]), a, delta, direction(delta), kappa, 0.05, VEHICLE, z_next, A, B
+        )
+        assert heading == direction(z_next[2])
         np.testing.assert_allclose(np.c_[A, B], numeric, atol=1e-7)
         np.testing.assert_array_equal(z_next, step(q))
 
@@ -136,8 +151,8 @@ def test_road_frame_and_cartesian_frame_agree_on_an_arc():
     road = np.array([0.0, 0.5, 0.05, 12.0, 0.0, 0.2])
     plane = np.array([0.0, 0.5, 0.05, 12.0, 0.0, 0.2])
     for _ in range(10_000):
-        dynamics.implicit_step(road, 0.3, 0.04, kappa, h, VEHICLE, road)
-        dynamics.implicit_step(plane, 0.3, 0.04, 0.0, h, VEHICLE, plane)
+        implicit_step(road, 0.3, 0.04, kappa, h, road)
+        implicit_step(plane, 0.3, 0.04, 0.0, h, plane)
     centre = np.array([0.0, 60.0])
     radius = np.hypot(*(plane[:2] - centre))
     angle = np.arctan2(plane[0], 60.0 - plane[1])

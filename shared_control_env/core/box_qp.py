@@ -19,7 +19,10 @@ def _solve_free(
     factor: np.ndarray,
     solution: np.ndarray,
 ) -> int:
-    """Minimise over the free variables, the others held: Cholesky solve into ``solution``; return how many."""
+    """Minimise over the free variables, the others held, by Cholesky into ``solution``; return how many they are.
+
+    The diagonal of ``factor`` holds the reciprocals of the factor's, so that what is divided once is not divided again.
+    """
     m = 0
     for i in range(n):
         if bound[i] != _FREE:
@@ -34,16 +37,16 @@ def _solve_free(
                 entry = H[i, j]
                 for q in range(k):
                     entry -= factor[m, q] * factor[k, q]
-                factor[m, k] = entry / factor[k, k] if k < m else entry**0.5
+                factor[m, k] = entry * factor[k, k] if k < m else 1.0 / entry**0.5
                 k += 1
         for q in range(m):
             rhs -= factor[m, q] * solution[q]
-        solution[m] = rhs / factor[m, m]
+        solution[m] = rhs * factor[m, m]
         m += 1
     for k in range(m - 1, -1, -1):
         for q in range(k + 1, m):
             solution[k] -= factor[q, k] * solution[q]
-        solution[k] /= factor[k, k]
+        solution[k] *= factor[k, k]
     return m
 
 

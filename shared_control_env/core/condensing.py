@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from shared_control_env.core.dynamics import PSI, V_X, V_Y, R, S, Y
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.parameters import PredictiveParameters
 from shared_control_env.core.records import MAX_CONTROL, Record
 
@@ -44,7 +44,7 @@ WORKSPACE = np.dtype(
 """Scratch of one solver; one record a thread serves any number of environments."""
 
 
-@jit
+@jit_inlined
 def clear(work: Record, n: int) -> None:
     """Start a condensation of n columns: zero gradient, Hessian and sensitivities of a :data:`WORKSPACE` record."""
     for c in range(_whole_lanes(n)):
@@ -61,7 +61,7 @@ def _whole_lanes(n: int) -> int:
     return (n + _LANES - 1) // _LANES * _LANES
 
 
-@jit
+@jit_inlined
 def propagate(work: Record, n: int) -> None:
     """Carry the sensitivity over a step: ``A sens``, plus B in the last two of the n columns in play.
 
@@ -94,7 +94,7 @@ def propagate(work: Record, n: int) -> None:
         yaw_step[n - 2 + column] += B[R, column]
 
 
-@jit
+@jit_inlined
 def add_square(work: Record, weight: float, residual: float, n: int) -> float:
     """Add ``weight (residual + row . dU)^2`` to the model.
 
@@ -115,7 +115,7 @@ def add_square(work: Record, weight: float, residual: float, n: int) -> float:
     return weight * residual * residual
 
 
-@jit
+@jit_inlined
 def add_tracking(
     work: Record,
     weights: PredictiveParameters,
@@ -153,7 +153,7 @@ def add_tracking(
     return W * y_error**2 + H * v_error**2 + N * r_change**2
 
 
-@jit
+@jit_inlined
 def add_effort(work: Record, weights: PredictiveParameters, U: np.ndarray) -> float:
     """Add the effort ``sum_j Q_a a(j)^2 + Q_delta delta(j)^2`` of the commands; return its value."""
     value = 0.0

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from shared_control_env.core.jit import jit, jit_allocating
+from shared_control_env.core.jit import jit, jit_allocating, jit_inlined
 from shared_control_env.core.parameters import VehicleParameters
 
 S, Y, PSI, V_X, V_Y, R = range(6)
@@ -117,7 +117,7 @@ def implicit_step(
     return heading
 
 
-@jit
+@jit_inlined
 def _step_velocities(
     z: np.ndarray, a: float, delta: float, wheel: Direction, h: float, vehicle: VehicleParameters
 ) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
@@ -137,7 +137,7 @@ def _step_velocities(
     return (v, i11 * b1 + i12 * b2, i21 * b1 + i22 * b2), (i11, i12, i21, i22)
 
 
-@jit
+@jit_inlined
 def _step_pose(
     z: np.ndarray, heading: Direction, v: float, v_y: float, r: float, kappa: float, h: float, z_next: np.ndarray
 ) -> tuple[Direction, float]:
@@ -152,7 +152,7 @@ def _step_pose(
     return heading, s_rate
 
 
-@jit
+@jit_inlined
 def implicit_step_jacobian(
     z: np.ndarray,
     heading: Direction,

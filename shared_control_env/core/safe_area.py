@@ -394,7 +394,7 @@ def _on_open_end(area: Record, s: float) -> float:
     return max(s, area.start)
 
 
-@jit
+@jit_inlined
 def _scan_chain(chain: np.ndarray, s: float, d: float) -> tuple[int, float, float, float]:
     """Segments of a chain above a point, for the even-odd rule; its squared distance, and the vector from there."""
     above, best, best_s, best_d = 0, np.inf, 0.0, 0.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from collections.abc import Callable
 from importlib.metadata import version
@@ -66,17 +65,15 @@ def _vectors(report: Callable[..., None], peer: Timing, single: Timing, repeats:
     metadrive = vectors.metadrive(max(3, repeats // 3))
     if metadrive is not None:
         report("MetaDrive, a step", str(metadrive), _times(peer, metadrive), "")
-    cores = os.cpu_count() or 1
     for driver, target in ((False, "100,000 steps/s a core"), (True, "80,000 steps/s a core")):
         who = "driver in the kernel" if driver else "random driver"
         for n in vectors.SIZES:
-            one = vectors.kernel(n, 1, driver, repeats)
+            one, every, ratio = vectors.kernel(n, driver, repeats)
             rate = f"{_times(single, one)} single, {1.0 / one.median:,.0f}/s"
             report(f"kernel, N = {n}, {who}, 1 core", str(one), rate, target if n == 1024 else "")
-            if cores > 1 and n >= 1024:
-                many = vectors.kernel(n, cores, driver, repeats)
-                rate = f"{_times(one, many)} one core, {1.0 / many.median:,.0f}/s"
-                report(f"kernel, N = {n}, {who}, {cores} cores", str(many), rate, "1.9 x on two cores")
+            if every is not None:
+                rate = f"{ratio:.2f} x one core, {1.0 / every.median:,.0f}/s"
+                report(f"kernel, N = {n}, {who}, all cores", str(every), rate, "1.9 x on two cores")
     report("memory of an environment", f"{vectors.bytes_per_environment():,} B", "", "4,096 B")
     for name, timing in parts.times(repeats).items():
         report(f"part: {name}", str(timing), "", "")

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from importlib.util import find_spec
+from time import perf_counter
+from typing import NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -18,22 +21,72 @@ ITERATIONS = 2
 """Gauss-Newton iterations of the automation in these timings."""
 
 
-def kernel(num_envs: int, threads: int, driver: bool, repeats: int) -> Timing:
-    """Time of one environment's step; random driver commands, or the driver's program in the kernel."""
+class Scaling(NamedTuple):
+    """Time of one environment's step on one core and on all.
+
+    Attributes:
+        one: on one core.
+        all: on all cores; None where there is one core or the environments are few.
+        ratio: how many times as many steps all make as one, median of the rounds; 1 where there is no ``all``.
+    """
+
+    one: Timing
+    all: Timing | None
+    ratio: float
+
+
+def kernel(num_envs: int, driver: bool, repeats: int) -> Scaling:
+    """Random driver commands, or the driver's program in the kernel.
+
+    A round times every core by itself and then all together, since on a shared machine the cores differ, and change
+    their speeds from one second to the next.
+    """
+    ours = cores()
+    alone = _block(num_envs, 1, driver)
+    everywhere = _block(num_envs, len(ours), driver) if len(ours) > 1 and num_envs >= 1024 else None
+    one, every, ratios = [], [], []
+    for _ in range(repeats):
+        round_of_one = [_on_core(core, alone) for core in ours]
+        one += round_of_one
+        if everywhere is not None:
+            every.append(everywhere())
+            ratios.append(1.0 / every[-1] / np.mean([1.0 / seconds for seconds in round_of_one]))
+    return Scaling(Timing.of(one), Timing.of(every) if every else None, float(np.median(ratios)) if ratios else 1.0)
+
+
+def cores() -> list[int]:
+    """Cores that this process may use, where the system says."""
+    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
+
+
+def _block(num_envs: int, threads: int, driver: bool) -> Callable[[], float]:
+    """Some steps of new environments; the first are taken at once, unmeasured."""
     config = {"solver": {"iterations": ITERATIONS}}
     env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=num_envs, threads=threads, driver=driver, config=config)
     env.reset(seed=0)
     actions = 0.1 * np.random.default_rng(0).normal(size=(num_envs, 2)).clip(-1, 1)
     steps = max(2, 4096 // num_envs)
 
-    def block() -> int:
+    def block() -> float:
+        begin = perf_counter()
         for _ in range(steps):
             env.step(actions)
-        return steps * num_envs
+        return (perf_counter() - begin) / (steps * num_envs)
 
-    timing = time_block(block, repeats)
-    env.close()
-    return timing
+    block()
+    return block
+
+
+def _on_core(core: int, block: Callable[[], float]) -> float:
+    """Time a block on one core, where the system lets us choose."""
+    if not hasattr(os, "sched_setaffinity"):
+        return block()
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {core})
+    try:
+        return block()
+    finally:
+        os.sched_setaffinity(0, allowed)
 
 
 def highway_processes(repeats: int) -> Timing:

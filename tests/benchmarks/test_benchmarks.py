@@ -27,8 +27,14 @@ def test_every_part_runs():
 
 def test_parts_and_vectors_run():
     assert all(timing.median > 0.0 for timing in parts.times(1).values())
-    assert vectors.kernel(64, 1, False, 1).median > 0.0
-    assert vectors.kernel(64, 2, True, 1).median > 0.0
+    few = vectors.kernel(64, True, 1)
+    assert few.one.median > 0.0
+    assert (few.all, few.ratio) == (None, 1.0)
+    allowed = vectors.cores()
+    many = vectors.kernel(1024, False, 1)
+    assert vectors.cores() == allowed
+    assert (many.all is None) is (len(allowed) == 1)
+    assert many.ratio > 0.0
     (seconds,) = suite.seconds_for(10, 1, "paper")
     assert seconds > 0.0
     assert 0 < vectors.bytes_per_environment() <= 4096

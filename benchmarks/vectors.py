@@ -21,12 +21,16 @@ ITERATIONS = 2
 """Gauss-Newton iterations of the automation in these timings."""
 
 
+BLOCK = 16_384
+"""Steps of one environment in a timing: enough that waking a thread or filling a cache once does not show."""
+
+
 class Scaling(NamedTuple):
     """Time of one environment's step on one core and on all.
 
     Attributes:
         one: on one core.
-        all: on all cores; None where there is one core or the environments are few.
+        all: on all cores; None for one core or one environment.
         ratio: how many times as many steps all make as one, median of the rounds; 1 where there is no ``all``.
     """
 
@@ -43,7 +47,7 @@ def kernel(num_envs: int, driver: bool, repeats: int) -> Scaling:
     """
     ours = cores()
     alone = _block(num_envs, 1, driver)
-    everywhere = _block(num_envs, len(ours), driver) if len(ours) > 1 and num_envs >= 1024 else None
+    everywhere = _block(num_envs, len(ours), driver) if min(len(ours), num_envs) > 1 else None
     one, every, ratios = [], [], []
     for _ in range(repeats):
         round_of_one = [_on_core(core, alone) for core in ours]
@@ -65,7 +69,7 @@ def _block(num_envs: int, threads: int, driver: bool) -> Callable[[], float]:
     env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=num_envs, threads=threads, driver=driver, config=config)
     env.reset(seed=0)
     actions = 0.1 * np.random.default_rng(0).normal(size=(num_envs, 2)).clip(-1, 1)
-    steps = max(2, 4096 // num_envs)
+    steps = max(2, BLOCK // num_envs)
 
     def block() -> float:
         begin = perf_counter()

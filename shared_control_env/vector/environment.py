@@ -61,7 +61,7 @@ KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_vehicles_type")
 """Settings that all environments share."""
 
-FEWEST_PER_THREAD = 64
+FEWEST_PER_THREAD = 32
 """Environments under which another thread costs more than it saves."""
 
 
@@ -425,7 +425,7 @@ class SharedControlVectorEnv(VectorEnv):
         """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
         rewards = np.zeros((steps, self.num_envs))
         ends = np.zeros((steps, self.num_envs), dtype=bool)
-        taken = np.zeros(1, dtype=np.int64)
+        taken = np.zeros(self.threads, dtype=np.int64)
 
         def work(thread: int) -> None:
             kernel.advance(
@@ -495,9 +495,9 @@ class SharedControlVectorEnv(VectorEnv):
             size = SLOT_SPACES[slot].shape[0]
             if array.shape != (self.num_envs, size):
                 raise ValueError(f"actions[{slot!r}] has shape {array.shape}; it must be ({self.num_envs}, {size})")
-            finite = np.isfinite(array).all(axis=1)
+            finite = np.isfinite(array)
             if not finite.all():
-                index = int(np.flatnonzero(~finite)[0])
+                index = int(np.argwhere(~finite)[0, 0])
                 low, high = SLOT_SPACES[slot].low[0], SLOT_SPACES[slot].high[0]
                 raise ValueError(
                     f"action of environment {index}, slot {slot!r}, is {array[index]}; "

@@ -30,14 +30,14 @@ def call_of(signature: Any) -> Any:
     return call
 
 
-def _fetch_add(typing_context: Any, counter: Any, amount: Any) -> Any:
-    """Add to the first entry of an int64 array and return what it was, with no other thread in between."""
+def _fetch_add(typing_context: Any, counts: Any, index: Any, amount: Any) -> Any:
+    """Add to an entry of a contiguous int64 array and return what it was, with no other thread in between."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        pointer = make_array(signature.args[0])(context, builder, values[0]).data
-        return builder.atomic_rmw("add", pointer, values[1], "monotonic")
+        first = make_array(signature.args[0])(context, builder, values[0]).data
+        return builder.atomic_rmw("add", builder.gep(first, [values[1]]), values[2], "monotonic")
 
-    return types.int64(counter, types.int64), generate
+    return types.int64(counts, types.int64, types.int64), generate
 
 
 fetch_add: Any = intrinsic(_fetch_add)

@@ -23,7 +23,7 @@ automate, drive = solvers.AUTOMATE.call, solvers.DRIVE.call
 triangulate, search = solvers.TRIANGULATE.call, solvers.SEARCH.call
 """Calls of the solvers, at their addresses in :class:`Setup`."""
 
-TAKEN_AT_ONCE = 16
+TAKEN_AT_ONCE = 4
 """Environments that a thread takes at a time: few, so that one that is held up leaves the others no long wait."""
 
 
@@ -211,6 +211,43 @@ def keep_final(i: int, out: Outputs) -> None:
     out.final_solver[i] = out.solver[i]
 
 
+@jit_inlined
+def advance_through(
+    i: int,
+    steps: int,
+    resets: np.ndarray,
+    commands: np.ndarray,
+    alphas: np.ndarray,
+    batch: Batch,
+    setup: Setup,
+    out: Outputs,
+    rewards: np.ndarray,
+    ends: np.ndarray,
+    work: Record,
+    program: Record,
+) -> None:
+    """Advance environment i by some steps in a row; arguments as those of :func:`advance`."""
+    k = 0
+    resetting = resets[i] or (setup.autoreset == NEXT_STEP and batch.ended[i])
+    same_step = terminated = truncated = False
+    while k < steps:
+        advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
+        if same_step:
+            out.rewards[i], out.terminations[i], out.truncations[i] = rewards[k, i], terminated, truncated
+        else:
+            rewards[k, i] = out.rewards[i]
+            terminated, truncated = out.terminations[i], out.truncations[i]
+            ends[k, i] = terminated or truncated
+        same_step = not same_step and ends[k, i] and setup.autoreset == SAME_STEP
+        if same_step:
+            keep_final(i, out)
+            resetting = True
+            continue
+        batch.ended[i] = ends[k, i] and setup.autoreset != SAME_STEP
+        resetting = setup.autoreset == NEXT_STEP and batch.ended[i]
+        k += 1
+
+
 @jit
 def advance(
     taken: np.ndarray,
@@ -230,10 +267,11 @@ def advance(
 ) -> None:
     """Advance the environments, each by some steps in a row, resetting as the autoreset mode says.
 
-    Any number of threads may call it for the same environments; each takes the next few that nobody has taken.
+    As many threads as there are shares of the environments call it; each first takes those of its own share, which
+    its core's cache may hold from the step before, then helps with the other shares.
 
     Args:
-        taken: environments that threads have taken so far, (1,).
+        taken: environments of each share that threads have taken so far, (threads,).
         steps: how many time steps; the actions are held or bound.
         active: environments that are advanced at all, (N,).
         resets: environments whose first step is a reset, (N,).
@@ -248,28 +286,13 @@ def advance(
         thread: which of them is ours.
     """
     work, program = works[thread], programs[thread]
-    first = fetch_add(taken, TAKEN_AT_ONCE)
-    while first < active.shape[0]:
-        for i in range(first, min(first + TAKEN_AT_ONCE, active.shape[0])):
-            if not active[i]:
-                continue
-            k = 0
-            resetting = resets[i] or (setup.autoreset == NEXT_STEP and batch.ended[i])
-            same_step = terminated = truncated = False
-            while k < steps:
-                advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
-                if same_step:
-                    out.rewards[i], out.terminations[i], out.truncations[i] = rewards[k, i], terminated, truncated
-                else:
-                    rewards[k, i] = out.rewards[i]
-                    terminated, truncated = out.terminations[i], out.truncations[i]
-                    ends[k, i] = terminated or truncated
-                same_step = not same_step and ends[k, i] and setup.autoreset == SAME_STEP
-                if same_step:
-                    keep_final(i, out)
-                    resetting = True
-                    continue
-                batch.ended[i] = ends[k, i] and setup.autoreset != SAME_STEP
-                resetting = setup.autoreset == NEXT_STEP and batch.ended[i]
-                k += 1
-        first = fetch_add(taken, TAKEN_AT_ONCE)
+    n, shares = active.shape[0], taken.shape[0]
+    for turn in range(shares):
+        share = (thread + turn) % shares
+        begin, end = share * n // shares, (share + 1) * n // shares
+        first = begin + fetch_add(taken, share, TAKEN_AT_ONCE)
+        while first < end:
+            for i in range(first, min(first + TAKEN_AT_ONCE, end)):
+                if active[i]:
+                    advance_through(i, steps, resets, commands, alphas, batch, setup, out, rewards, ends, work, program)
+            first = begin + fetch_add(taken, share, TAKEN_AT_ONCE)

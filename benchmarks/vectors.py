@@ -20,7 +20,6 @@ SIZES = (1, 64, 1024, 4096)
 ITERATIONS = 2
 """Gauss-Newton iterations of the automation in these timings."""
 
-
 BLOCK = 16_384
 """Steps of one environment in a timing: enough that waking a thread or filling a cache once does not show."""
 
@@ -42,20 +41,26 @@ class Scaling(NamedTuple):
 def kernel(num_envs: int, driver: bool, repeats: int) -> Scaling:
     """Random driver commands, or the driver's program in the kernel.
 
-    A round times every core by itself and then all together, since on a shared machine the cores differ, and change
-    their speeds from one second to the next.
+    A round times every core by itself, and all together after each, since on a shared machine the cores differ, and
+    change their speeds from one second to the next; all environments get equally far in their episodes.
     """
     ours = cores()
     alone = _block(num_envs, 1, driver)
     everywhere = _block(num_envs, len(ours), driver) if min(len(ours), num_envs) > 1 else None
     one, every, ratios = [], [], []
     for _ in range(repeats):
-        round_of_one = [_on_core(core, alone) for core in ours]
-        one += round_of_one
+        for core in ours:
+            one.append(_on_core(core, alone))
+            if everywhere is not None:
+                every.append(everywhere())
         if everywhere is not None:
-            every.append(everywhere())
-            ratios.append(1.0 / every[-1] / np.mean([1.0 / seconds for seconds in round_of_one]))
+            ratios.append(_rate(every[-len(ours) :]) / _rate(one[-len(ours) :]))
     return Scaling(Timing.of(one), Timing.of(every) if every else None, float(np.median(ratios)) if ratios else 1.0)
+
+
+def _rate(seconds: list[float]) -> float:
+    """Mean steps a second of some times a step."""
+    return float(np.mean(1.0 / np.array(seconds)))
 
 
 def cores() -> list[int]:

@@ -13,15 +13,14 @@ from benchmarks.timing import Timing, time_block
 from shared_control_env.core import (
     assessment,
     automation_mpc,
-    delaunay,
     driver_qp,
     dynamics,
     fuzzy,
     observation,
-    safe_area,
 )
 from shared_control_env.core import scene as scenes
 from shared_control_env.core.active_set_qp import solve_qp
+from shared_control_env.vector.kernel import search, triangulate
 from shared_control_env.vector.records import PROGRAM, WORKSPACE, Batch, Setup
 
 N = 256
@@ -50,10 +49,8 @@ def _triangulation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.n
         for n in range(4):
             work.corners[0, n, 0] = s + (2.5 if n < 2 else -2.5)
             work.corners[0, n, 1] = scene.region[3] + (0.7 if n == 0 or n == 3 else -0.6)
-        n = delaunay.triangulate(scene.region, work.corners, 1, work.triangles)
-        safe_area.search_triangles(
-            work.triangles.triangles[:n], scene.region[0], scene.region[1], scene.z[1], 2.0, scene.area
-        )
+        n = triangulate(setup.solvers.triangulate, scene, 1, work)
+        search(setup.solvers.search, scene, batch.parameters[i], n, work)
 
 
 @njit

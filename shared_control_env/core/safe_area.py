@@ -10,6 +10,7 @@ one vehicle length (5 cm at a radius of 60 m).
 from __future__ import annotations
 
 from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -22,6 +23,48 @@ REACHED, BLOCKED = 0, 1
 
 _ON_LINE = 1e-9
 """Distance under which a vertex lies on the rear or front line of the region [m]."""
+
+
+class Scratch(NamedTuple):
+    """What a search through n triangles works in; longer arrays do as well.
+
+    Attributes:
+        neighbours: :func:`adjacency`, (n, 3).
+        distance: length of the shortest way into each triangle [m], (n,).
+        at: where that way enters it, (s, d) [m], (n, 2).
+        parent: the triangle it is entered from, or -1, (n,).
+        entry: the edge it is entered by, or -1, (n,).
+        done: 1 where its distance is final, (n,).
+        sequence: triangles of the way found, from front to rear, (n,).
+        stack: triangles and edges yet to look at, (3 n, 2).
+        ring: outline of the triangles that can be entered, (s, d) [m], (3 n + 2, 2).
+    """
+
+    neighbours: np.ndarray
+    distance: np.ndarray
+    at: np.ndarray
+    parent: np.ndarray
+    entry: np.ndarray
+    done: np.ndarray
+    sequence: np.ndarray
+    stack: np.ndarray
+    ring: np.ndarray
+
+
+@jit_allocating
+def new_scratch(n: int) -> Scratch:
+    """Scratch for n triangles."""
+    return Scratch(
+        np.empty((n, 3), dtype=np.int64),
+        np.empty(n),
+        np.empty((n, 2)),
+        np.empty(n, dtype=np.int64),
+        np.empty(n, dtype=np.int64),
+        np.empty(n, dtype=np.int8),
+        np.empty(n, dtype=np.int64),
+        np.empty((3 * n, 2), dtype=np.int64),
+        np.empty((3 * n + 2, 2)),
+    )
 
 
 def triangulate(start: float, end: float, low: float, high: float, holes: np.ndarray) -> np.ndarray:
@@ -55,7 +98,7 @@ def find_safe_area(region: np.ndarray, d: float, holes: np.ndarray, min_width: f
         area: record of :data:`records.SAFE_AREA`, written.
     """
     triangles = triangulate(region[0], region[1], region[2], region[3], holes)
-    search_triangles(triangles, region[0], region[1], d, min_width, area)
+    search_triangles(triangles, region[0], region[1], d, min_width, new_scratch(triangles.shape[0]), area)
 
 
 @jit_inlined
@@ -73,8 +116,10 @@ def whole_region(region: np.ndarray, area: Record) -> None:
     area.start, area.end, area.outcome = region[0], region[1], REACHED
 
 
-@jit_allocating
-def search_triangles(triangles: np.ndarray, start: float, end: float, d: float, min_width: float, area: Record) -> None:
+@jit
+def search_triangles(
+    triangles: np.ndarray, start: float, end: float, d: float, min_width: float, scratch: Scratch, area: Record
+) -> None:
     """Sequence of triangles from the ego to the final region, and its boundaries (Table I, steps 2-4).
 
     The table says only to search adjacent triangles until the final one is found. Readings: the fewest
@@ -88,23 +133,24 @@ def search_triangles(triangles: np.ndarray, start: float, end: float, d: float, 
         start, end: rear and front line of the region [m].
         d: lateral position of the ego on the rear line [m].
         min_width: narrowest passage [m].
+        scratch: for as many triangles.
         area: record of :data:`records.SAFE_AREA`, written.
     """
     orient(triangles)
-    neighbours = adjacency(triangles)
+    adjacency(triangles, scratch.neighbours)
     first, rear_edge = _edge_on_line(triangles, start, d)
     area.start = start
     if first < 0:
         _start_chains(area, start, d)
         area.end, area.outcome = start, BLOCKED
         return
-    parent, entry, goal, front_edge = _search(triangles, neighbours, first, rear_edge, start, end, d, min_width)
+    goal, front_edge = _search(triangles, first, rear_edge, start, end, d, min_width, scratch)
     if goal >= 0:
         area.outcome = REACHED
-        _trace_sequence(triangles, parent, entry, goal, front_edge, area)
+        _trace_sequence(triangles, goal, front_edge, scratch, area)
     else:
         area.outcome = BLOCKED
-        _trace_reachable(triangles, neighbours, parent, entry, first, area)
+        _trace_reachable(triangles, first, scratch, area)
     area.end = max(area.lower[MAX_CHAIN - 1, 0], area.upper[MAX_CHAIN - 1, 0])
 
 
@@ -136,25 +182,23 @@ def _same_edge(triangles: np.ndarray, i: int, edge: int, j: int) -> int:
     return -1
 
 
-@jit_allocating
-def adjacency(triangles: np.ndarray) -> np.ndarray:
+@jit_inlined
+def adjacency(triangles: np.ndarray, neighbours: np.ndarray) -> None:
     """Adjacency (Table I, step 3) as a list: ``[i, edge]`` is the triangle over that edge, or -1.
+
+    The table's matrix D(i, j) is 1 where j is in row i.
 
     Args:
         triangles: counter-clockwise, shape (m, 3, 2).
-
-    Returns:
-        Integer array, shape (m, 3); the table's matrix D(i, j) is 1 where j is in row i.
+        neighbours: integers, written, shape (>= m, 3).
     """
     n = triangles.shape[0]
-    neighbours = np.empty((n, 3), dtype=np.int64)
     for i in range(n):
         for edge in range(3):
             neighbours[i, edge] = -1
             for j in range(n):
                 if _same_edge(triangles, i, edge, j) >= 0:
                     neighbours[i, edge] = j
-    return neighbours
 
 
 @jit_inlined
@@ -181,9 +225,16 @@ def _edge_distance(triangles: np.ndarray, i: int, edge: int, s: float, d: float)
     return hypot(s - a[0] - along * es, d - a[1] - along * ed)
 
 
-@jit_allocating
+@jit
 def clearance(
-    triangles: np.ndarray, neighbours: np.ndarray, i: int, entry: int, leave: int, start: float, end: float
+    triangles: np.ndarray,
+    neighbours: np.ndarray,
+    i: int,
+    entry: int,
+    leave: int,
+    start: float,
+    end: float,
+    stack: np.ndarray,
 ) -> float:
     """Width of the passage through a triangle from one edge to another [m].
 
@@ -192,10 +243,11 @@ def clearance(
     Triangulation-Based Pathfinding, AAAI 2006), and at most the length of either edge.
 
     Args:
-        triangles, neighbours: of :func:`adjacency`.
+        triangles, neighbours: as of :func:`adjacency`.
         i: the triangle.
         entry, leave: its two edges.
         start, end: rear and front line, which are open.
+        stack: of a :class:`Scratch`, written.
     """
     ls, ld, rs, rd = _left_and_right(triangles, i, entry)
     width = hypot(ls - rs, ld - rd)
@@ -203,7 +255,6 @@ def clearance(
     width = min(width, hypot(ls - rs, ld - rd))
     across = 3 - entry - leave
     s, d = triangles[i, (across + 2) % 3, 0], triangles[i, (across + 2) % 3, 1]
-    stack = np.empty((3 * triangles.shape[0], 2), dtype=np.int64)
     stack[0, 0], stack[0, 1] = i, across
     size = 1
     while size > 0:
@@ -227,39 +278,36 @@ def clearance(
     return width
 
 
-@jit_allocating
+@jit_inlined
 def _search(
     triangles: np.ndarray,
-    neighbours: np.ndarray,
     first: int,
     rear_edge: int,
     start: float,
     end: float,
     d: float,
     min_width: float,
-) -> tuple[np.ndarray, np.ndarray, int, int]:
-    """Dijkstra from the ego's triangle through the midpoints of the edges crossed.
+    scratch: Scratch,
+) -> tuple[int, int]:
+    """Dijkstra from the ego's triangle through the midpoints of the edges crossed; fills ``scratch``.
 
     Returns:
-        For each triangle the one it is entered from and the edge it is entered by, or -1; the
-        triangle in which the front line is reached and its edge there, or -1.
+        The triangle in which the front line is reached and its edge there, or -1.
     """
-    n = triangles.shape[0]
-    distance, at = np.empty(n), np.empty((n, 2))
-    parent, entry = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    done = np.empty(n, dtype=np.bool_)
+    n, neighbours = triangles.shape[0], scratch.neighbours
+    distance, at, parent, entry, done = scratch.distance, scratch.at, scratch.parent, scratch.entry, scratch.done
     for j in range(n):
-        distance[j], parent[j], entry[j], done[j] = np.inf, -1, -1, False
+        distance[j], parent[j], entry[j], done[j] = np.inf, -1, -1, 0
     distance[first], entry[first], at[first, 0], at[first, 1] = 0.0, rear_edge, start, d
     goal, front_edge, goal_distance = -1, -1, np.inf
     for _ in range(n):
         i, best = -1, np.inf
         for j in range(n):
-            if not done[j] and distance[j] < best:
+            if done[j] == 0 and distance[j] < best:
                 i, best = j, distance[j]
         if i < 0:
             break
-        done[i] = True
+        done[i] = 1
         for edge in range(3):
             if edge == entry[i]:
                 continue
@@ -272,14 +320,14 @@ def _search(
             way = distance[i] + hypot(ms - at[i, 0], md - at[i, 1])
             if way >= (goal_distance if j < 0 else distance[j]):
                 continue
-            if clearance(triangles, neighbours, i, entry[i], edge, start, end) < min_width:
+            if clearance(triangles, neighbours, i, entry[i], edge, start, end, scratch.stack) < min_width:
                 continue
             if j < 0:
                 goal, front_edge, goal_distance = i, edge, way
             else:
                 distance[j], parent[j], entry[j] = way, i, _same_edge(triangles, i, edge, j)
                 at[j, 0], at[j, 1] = ms, md
-    return parent, entry, goal, front_edge
+    return goal, front_edge
 
 
 @jit
@@ -311,11 +359,9 @@ def _finish_chains(area: Record, n_lower: int, n_upper: int) -> None:
 
 
 @jit_inlined
-def _trace_sequence(
-    triangles: np.ndarray, parent: np.ndarray, entry: np.ndarray, goal: int, front_edge: int, area: Record
-) -> None:
+def _trace_sequence(triangles: np.ndarray, goal: int, front_edge: int, scratch: Scratch, area: Record) -> None:
     """Boundaries of the sequence: left and right ends of every edge it crosses, from rear to front."""
-    sequence = np.empty(triangles.shape[0], dtype=np.int64)
+    parent, entry, sequence = scratch.parent, scratch.entry, scratch.sequence
     length = 0
     i = goal
     while i >= 0:
@@ -336,24 +382,16 @@ def _trace_sequence(
 
 
 @jit_inlined
-def _trace_reachable(
-    triangles: np.ndarray,
-    neighbours: np.ndarray,
-    parent: np.ndarray,
-    entry: np.ndarray,
-    first: int,
-    area: Record,
-) -> None:
+def _trace_reachable(triangles: np.ndarray, first: int, scratch: Scratch, area: Record) -> None:
     """Outline of all triangles entered, from the right end of the rear edge around to its left end.
 
     The outline is split at its vertex furthest ahead into the lower and the upper boundary.
     """
-    n = triangles.shape[0]
-    ring = np.empty((3 * n + 2, 2))
+    neighbours, parent, entry = scratch.neighbours, scratch.parent, scratch.entry
+    stack, ring = scratch.stack, scratch.ring
     corner = (entry[first] + 1) % 3
     ring[0, 0], ring[0, 1] = triangles[first, corner, 0], triangles[first, corner, 1]
     size = 1
-    stack = np.empty((3 * n, 2), dtype=np.int64)
     stack[0, 0], stack[0, 1] = first, 2
     stack[1, 0], stack[1, 1] = first, 1
     depth = 2

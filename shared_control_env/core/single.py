@@ -43,11 +43,11 @@ def sense(
     return scenes.holes_in_region(traffic, line, scene[()].region, corners)
 
 
-@jit
+@jit_allocating
 def search(triangles: np.ndarray, parameters: Record, scene: Record) -> None:
     """:func:`safe_area.search_triangles` of a scene's driving region."""
-    s, p = scene[()], parameters[()]
-    safe_area.search_triangles(triangles, s.region[0], s.region[1], s.z[1], p.vehicle.width, s.area)
+    s, p, scratch = scene[()], parameters[()], safe_area.new_scratch(triangles.shape[0])
+    safe_area.search_triangles(triangles, s.region[0], s.region[1], s.z[1], p.vehicle.width, scratch, s.area)
 
 
 @jit

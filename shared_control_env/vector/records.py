@@ -8,6 +8,7 @@ import numpy as np
 
 from shared_control_env.core import active_set_qp, condensing, delaunay
 from shared_control_env.core.active_set_qp import MAX_ROWS, MAX_VARIABLES
+from shared_control_env.core.delaunay import MAX_TRIANGLES
 
 NEXT_STEP, SAME_STEP, DISABLED = range(3)
 """Codes of Gymnasium's autoreset modes."""
@@ -138,10 +139,27 @@ SOLVER = np.dtype(
 )
 """Report of the driver's solver, as ``info["driver"]``."""
 
+SEARCH = np.dtype(
+    [
+        ("neighbours", np.int64, (MAX_TRIANGLES, 3)),
+        ("distance", np.float64, (MAX_TRIANGLES,)),
+        ("at", np.float64, (MAX_TRIANGLES, 2)),
+        ("parent", np.int64, (MAX_TRIANGLES,)),
+        ("entry", np.int64, (MAX_TRIANGLES,)),
+        ("done", np.int8, (MAX_TRIANGLES,)),
+        ("sequence", np.int64, (MAX_TRIANGLES,)),
+        ("stack", np.int64, (3 * MAX_TRIANGLES, 2)),
+        ("ring", np.float64, (3 * MAX_TRIANGLES + 2, 2)),
+    ],
+    align=True,
+)
+"""Arrays of :class:`safe_area.Scratch`."""
+
 WORKSPACE = np.dtype(
     [
         ("solver", condensing.WORKSPACE),
         ("triangles", delaunay.WORKSPACE),
+        ("search", SEARCH),
         ("corners", np.float64, (delaunay.MAX_HOLES, 4, 2)),  # vehicles in the driving region
         ("row", np.float64, (8,)),  # the ego as a row of traffic
         ("plant", np.float64, (2, 6)),

@@ -17,7 +17,7 @@ from shared_control_env.core import active_set_qp, closed_loop, condensing, dela
 from shared_control_env.core.driver_qp import build_program
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, Record, record_dtype
-from shared_control_env.core.safe_area import search_triangles
+from shared_control_env.core.safe_area import Scratch, search_triangles
 from shared_control_env.vector.intrinsics import call_of
 from shared_control_env.vector.records import PROGRAM, SOLVER, WORKSPACE, Addresses
 
@@ -76,8 +76,9 @@ def search(scene: Record, p: Parameters, n: int, work: Record) -> None:
         n: triangles.
         work: record of :data:`records.WORKSPACE`.
     """
-    triangles = work.triangles.triangles[:n]
-    search_triangles(triangles, scene.region[0], scene.region[1], scene.z[1], p.vehicle.width, scene.area)
+    triangles, w = work.triangles.triangles[:n], work.search
+    scratch = Scratch(w.neighbours, w.distance, w.at, w.parent, w.entry, w.done, w.sequence, w.stack, w.ring)
+    search_triangles(triangles, scene.region[0], scene.region[1], scene.z[1], p.vehicle.width, scratch, scene.area)
 
 
 def drive(scene: Record, p: Parameters, memory: Record, work: Record, program: Record, report: Record) -> None:

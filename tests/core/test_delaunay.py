@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from shared_control_env.core import delaunay, safe_area
-from shared_control_env.core.jit import jit
+from shared_control_env.core.jit import jit_allocating
 from shared_control_env.core.records import SAFE_AREA
 
 LAYOUTS = 10_000
@@ -41,9 +41,10 @@ def free_region(region: np.ndarray, holes: np.ndarray) -> shapely.Geometry:
     return shapely.box(start, low, end, high).difference(shapely.union_all(shapely.polygons(holes)))
 
 
-@jit
+@jit_allocating
 def search(triangles: np.ndarray, start: float, end: float, d: float, min_width: float, area: np.ndarray) -> None:
-    safe_area.search_triangles(triangles, start, end, d, min_width, area[()])
+    scratch = safe_area.new_scratch(len(triangles))
+    safe_area.search_triangles(triangles, start, end, d, min_width, scratch, area[()])
 
 
 def boundaries(triangles: np.ndarray, region: np.ndarray, d: float, min_width: float) -> np.ndarray:

@@ -52,7 +52,8 @@ def test_triangles_partition_the_free_region_and_are_delaunay(holes):
     if shapes:
         assert shapely.union_all(shapes).symmetric_difference(free).area < 1e-6
     sa.orient(triangles)
-    neighbours = sa.adjacency(triangles)
+    neighbours = np.empty((len(triangles), 3), dtype=np.int64)
+    sa.adjacency(triangles, neighbours)
     for i in range(len(triangles)):
         for edge in range(3):
             j = neighbours[i, edge]

@@ -71,6 +71,7 @@ def clear_faults(memories: np.ndarray) -> None:
     """State of degradations that have not acted; what else they keep is written before it is read."""
     for i in range(memories.shape[0]):
         memories[i].acting = False
+        memories[i].last[0] = memories[i].last[1] = 0.0
 
 
 @jit

@@ -17,6 +17,7 @@ from math import cos, sin
 
 import numpy as np
 
+from shared_control_env.core.active_set_qp import UNBOUNDED
 from shared_control_env.core.condensing import add_effort, add_tracking, clear, propagate
 from shared_control_env.core.dynamics import PSI, V_X, V_Y, R, S, Y, implicit_step_jacobian
 from shared_control_env.core.jit import jit_inlined
@@ -34,9 +35,6 @@ centimetres instead. A penalty of 2000 makes OSQP miss its tolerance now and the
 
 SLACK_QUADRATIC = 1.0
 """Curvature of the slack's penalty [1/m^2], which makes the program strictly convex."""
-
-UNBOUNDED = 1e20
-"""Stands for infinity in the bounds, as OSQP takes it."""
 
 
 @jit_inlined

@@ -68,7 +68,9 @@ def new_scratch(n: int) -> Scratch:
 
 
 def triangulate(start: float, end: float, low: float, high: float, holes: np.ndarray) -> np.ndarray:
-    """Constrained Delaunay triangles of a rectangle less its holes (Table I, step 1).
+    """Constrained Delaunay triangles of a rectangle less its holes (Table I, step 1), by shapely.
+
+    For more holes than :func:`delaunay.triangulate` takes, and to test that one.
 
     Shapely raises when holes overlap or cross the shell, so their union is subtracted first.
 
@@ -87,23 +89,21 @@ def triangulate(start: float, end: float, low: float, high: float, holes: np.nda
     return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].copy()
 
 
-def find_safe_area(region: np.ndarray, d: float, holes: np.ndarray, min_width: float, area: Record) -> None:
-    """Safe area of a rectangular driving region (Table I).
+@jit
+def is_whole(count: int, region: np.ndarray, min_width: float) -> bool:
+    """Whether the safe area is the whole driving region, whatever its triangles.
 
     Args:
+        count: vehicles in the region.
         region: start, end along the road and low, high across it [m], shape (4,).
-        d: the ego's lateral position [m]; outside the region its nearest point counts.
-        holes: corners of the vehicles, shape (n, 4, 2) [m].
         min_width: narrowest passage that counts as one [m].
-        area: record of :data:`records.SAFE_AREA`, written.
     """
-    triangles = triangulate(region[0], region[1], region[2], region[3], holes)
-    search_triangles(triangles, region[0], region[1], d, min_width, new_scratch(triangles.shape[0]), area)
+    return count == 0 and region[3] - region[2] >= min_width
 
 
 @jit_inlined
 def whole_region(region: np.ndarray, area: Record) -> None:
-    """Safe area of a driving region without a vehicle inside: the region itself, whatever its triangles.
+    """Safe area where :func:`is_whole`: the driving region itself.
 
     Args:
         region: start, end along the road and low, high across it [m], shape (4,).

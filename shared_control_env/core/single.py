@@ -11,6 +11,7 @@ import numpy as np
 from shared_control_env.core import (
     automation_mpc,
     closed_loop,
+    delaunay,
     driver_qp,
     dynamics,
     fuzzy,
@@ -41,6 +42,24 @@ def sense(
     """:func:`scene.perceive`, then :func:`scene.holes_in_region`; returns the number of holes."""
     scenes.perceive(k, state, traffic, line, parameters[()], scene[()])
     return scenes.holes_in_region(traffic, line, scene[()].region, corners)
+
+
+@jit_allocating
+def find_area(corners: np.ndarray, count: int, parameters: Record, scene: Record, work: Record) -> None:
+    """Safe area of a scene around at most MAX_HOLES vehicles.
+
+    Args:
+        corners: of the vehicles in the driving region, shape (>= count, 4, 2).
+        count: how many there are.
+        parameters, scene: records; the scene's area is written.
+        work: record of :data:`delaunay.WORKSPACE`.
+    """
+    s, w = scene[()], work[()]
+    if safe_area.is_whole(count, s.region, parameters[()].vehicle.width):
+        safe_area.whole_region(s.region, s.area)
+    else:
+        n = max(0, delaunay.triangulate(s.region, corners, count, w))
+        search(w.triangles[:n], parameters, scene)
 
 
 @jit_allocating

@@ -11,7 +11,7 @@ from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.vehicle.graphics import VehicleGraphics
 
 from shared_control_env.controllers.automation import Automation
-from shared_control_env.core import single
+from shared_control_env.core import delaunay, single
 from shared_control_env.core.degradation import has_set_in
 from shared_control_env.core.info import INFO, as_dict
 from shared_control_env.core.records import FAULT_MEMORY, HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
@@ -63,6 +63,7 @@ class SharedControlEnv(AbstractEnv):
         self.scene = np.zeros((), SCENE)
         self.signals = np.zeros((), SIGNALS)
         self.memory = np.zeros((), MEMORY)
+        self._triangulation = np.zeros((), delaunay.WORKSPACE)
         super().__init__(config=config, render_mode=render_mode)
 
     @classmethod
@@ -181,8 +182,11 @@ class SharedControlEnv(AbstractEnv):
         # An episode may be driven on past its end; the picture's path stays within the duration.
         self._path[min(self.steps, len(self._path) - 1)] = state[:2]
         count = single.sense(self.steps, state, self.traffic, self.line, p, scene, self._corners)
-        start, end, low, high = scene["region"].tolist()
-        single.search(triangulate(start, end, low, high, self._corners[:count]), p, scene)
+        if count <= delaunay.MAX_HOLES:
+            single.find_area(self._corners, count, p, scene, self._triangulation)
+        else:
+            start, end, low, high = scene["region"].tolist()
+            single.search(triangulate(start, end, low, high, self._corners[:count]), p, scene)
         y, v_target = single.misjudge(scene, self.faults, p, signals)
         self.solution = self.automation.act(scene)
         single.judge_rightly(scene, y, v_target)

@@ -41,10 +41,10 @@ def _worthwhile() -> bool:
     worker = multiprocessing.parent_process() is not None
     if compiled.signatures or worker or getattr(sys, "frozen", False):
         return False
-    return _cores() > 1 and not is_cached(kernel.advance)
+    return cores() > 1 and not is_cached(kernel.advance)
 
 
-def _cores() -> int:
+def cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
+from gymnasium.error import ClosedEnvironmentError
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -35,11 +36,8 @@ from shared_control_env.envs.situation import start_of
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, space_of
 from shared_control_env.vector import cold_start, kernel
 from shared_control_env.vector.records import (
-    DISABLED,
-    NEXT_STEP,
     NOT_LOADED,
     PROGRAM,
-    SAME_STEP,
     SOLVER,
     WORKSPACE,
     Batch,
@@ -47,13 +45,6 @@ from shared_control_env.vector.records import (
     Setup,
     Starts,
 )
-
-AUTORESET = {
-    AutoresetMode.NEXT_STEP: NEXT_STEP,
-    AutoresetMode.SAME_STEP: SAME_STEP,
-    AutoresetMode.DISABLED: DISABLED,
-}
-"""Gymnasium's autoreset modes and their codes in the kernel."""
 
 KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 """Traffic that the kernel knows."""
@@ -137,27 +128,29 @@ class SharedControlVectorEnv(VectorEnv):
         names = {mode.name.lower(): mode for mode in AutoresetMode}
         if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in names:
             raise ValueError(f"autoreset_mode = {autoreset_mode!r} must be an AutoresetMode or one of {sorted(names)}")
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode = {render_mode!r} must be one of {self.metadata['render_modes']} or None")
         self._mode = autoreset_mode if isinstance(autoreset_mode, AutoresetMode) else names[autoreset_mode]
         self.num_envs, self.render_mode = num_envs, render_mode
         self._limiter, self._driver = limiter, driver
         self._case = case
         self._viewer_env: Any = None
         default = configuration.merge(configuration.plain(configuration.Settings()), case.settings)
-        self._settings = configuration.check(configuration.merge(default, config or {}))
-        self._templates = [self._settings] * num_envs
+        settings = configuration.check(configuration.merge(default, config or {}))
+        _check_for_kernel(settings)
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
-        wanted = threads or os.cpu_count() or 1
+        wanted = threads or cold_start.cores()
         self.threads = max(1, min(wanted, num_envs // FEWEST_PER_THREAD)) if threads is None else min(wanted, num_envs)
-        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._open_pool()
         self._works = np.zeros(self.threads, WORKSPACE)
         self._programs = np.zeros(self.threads, PROGRAM)
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
-        self._seeds: tuple[int | None, ...] = (None,) * num_envs
+        self._seeds: list[int | None] = [None] * num_envs
         self._generators: list[np.random.Generator | None] = [None] * num_envs
-        self._started = False
-        self._set_up()
+        self._solvers = NOT_LOADED
+        self._adopt(settings, [settings] * num_envs)
 
     def _define_spaces(self) -> None:
         """Spaces of the open slots, once."""
@@ -169,23 +162,23 @@ class SharedControlVectorEnv(VectorEnv):
         self.action_space = batch_space(single, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
-    def _set_up(self) -> None:
-        """Arrays and shared data from the settings."""
-        settings, n = self._settings, self.num_envs
-        if settings.other_vehicles_type != KERNEL_TRAFFIC:
-            raise ValueError(
-                f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} is not in the kernel; allowed is "
-                f"{KERNEL_TRAFFIC!r}; for others use gym.make_vec(..., vectorization_mode='sync')"
-            )
-        if len(settings.vehicles) > MAX_HOLES:
-            raise ValueError(
-                f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}"
-            )
+    def _open_pool(self) -> None:
+        """Start the threads beside the main one."""
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+        self._process = os.getpid()
+
+    def _adopt(self, settings: Settings, templates: list[Settings]) -> None:
+        """Take on settings, all and those of each environment; nothing has begun then."""
+        n = self.num_envs
+        self._settings, self._templates = settings, templates
+        self._started = False
+        self._close_viewer()
         self.metadata["render_fps"] = settings.policy_frequency
         self._path = np.zeros((settings.steps + 1, 2))
-        self._random = any(template is not settings or is_random(template) for template in self._templates)
-        self._episodes, self._prepared = [settings] * n, [settings] * n
-        starts = _no_starts(n if self._random else 1, self._templates)
+        self._random = any(template is not settings or is_random(template) for template in templates)
+        self._episodes = [settings] * n
+        faults, rows, vehicles = _most(templates)
+        starts = _starts(0 if self._random else 1, faults, rows, vehicles)
         if not self._random:
             _write_start(settings, starts, 0)
         self._setup = Setup(
@@ -195,24 +188,31 @@ class SharedControlVectorEnv(VectorEnv):
             dt=1.0 / settings.simulation_frequency,
             limiter=self._limiter,
             driver=self._driver,
-            autoreset=AUTORESET[self._mode],
-            solvers=NOT_LOADED,
+            autoreset=self._mode is AutoresetMode.NEXT_STEP,
+            solvers=self._solvers,
         )
         self._batch = Batch(
-            parameters=np.zeros(n, starts.parameters.dtype),
+            **_starts(n, faults, rows, vehicles)._asdict(),
             scenes=np.zeros(n, SCENE),
             signals=np.zeros(n, SIGNALS),
             memories=np.zeros(n, MEMORY),
             automations=np.zeros(n, AUTOMATION_MEMORY),
-            states=np.zeros((n, 6)),
-            lines=np.zeros((n, *starts.lines.shape[1:])),
-            faults=np.zeros((n, *starts.faults.shape[1:]), starts.faults.dtype),
-            fault_memories=np.zeros((n, *starts.faults.shape[1:]), FAULT_MEMORY),
-            traffic=np.zeros((n, *starts.traffic.shape[1:])),
-            plans=np.zeros((n, *starts.plans.shape[1:]), starts.plans.dtype),
+            fault_memories=np.zeros((n, faults), FAULT_MEMORY),
             crashed=np.zeros(n, dtype=bool),
             ended=np.zeros(n, dtype=bool),
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but what belongs to this process: threads, viewer, and where the solvers are in its memory."""
+        setup = self._setup._replace(solvers=NOT_LOADED)
+        return {**self.__dict__, "_pool": None, "_viewer_env": None, "_solvers": NOT_LOADED, "_setup": setup}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on where the pickled or copied one was."""
+        self.__dict__.update(state)
+        self._open_pool()
+        if self._started:
+            self._load_solvers()
 
     @property
     def config(self) -> dict[str, Any]:
@@ -235,15 +235,21 @@ class SharedControlVectorEnv(VectorEnv):
         return tuple(self._episodes)
 
     @property
-    def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
-        """Seed of each environment, None where it was not given one."""
-        return self._seeds
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Seed of each environment, a random one where none was given."""
+        for i in range(self.num_envs):
+            self._generator(i)
+        return tuple(seed for seed in self._seeds if seed is not None)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """Generator of each environment."""
+        return tuple(self._generator(i) for i in range(self.num_envs))
 
     @property
     def bytes_per_environment(self) -> int:
-        """Memory of one environment's state [B]."""
-        starts = self._setup.starts if self._random else ()
-        return sum(array.nbytes for array in (*self._batch, *starts)) // self.num_envs
+        """Memory of one environment's state [B], without what a step returns."""
+        return sum(array.nbytes for array in self._batch) // self.num_envs
 
     def reset(
         self,
@@ -262,30 +268,33 @@ class SharedControlVectorEnv(VectorEnv):
             Observations, and infos with masks as Gymnasium's.
 
         Raises:
-            ValueError: for unknown options, a wrong mask, seeds of another number, or wrong settings.
+            ValueError: for unknown options, a wrong mask, wrong seeds or settings, all of which change nothing; also
+                if an episode cannot be drawn, before any environment is reset.
+            ClosedEnvironmentError: after :meth:`close`.
         """
+        self._check_open()
         options = dict(options or {})
         mask = self._checked_mask(options.pop("reset_mask", None))
         config = options.pop("config", None)
         if options:
             raise ValueError(f"options has the unknown key(s) {sorted(options)}; valid are 'config' and 'reset_mask'")
-        if config is not None:
-            if not mask.all():
-                raise ValueError(
-                    "options['config'] changes all environments; it does not go with a partial 'reset_mask'"
-                )
-            self._configure(config)
-        self._take_seeds(seed, mask)
+        if config is not None and not mask.all():
+            raise ValueError("options['config'] changes all environments; it does not go with a partial 'reset_mask'")
+        changed = None if config is None else self._changed(config)
+        generators = self._seeded(seed)
+        if changed is not None:
+            self._adopt(*changed)
+        for i in np.flatnonzero(mask).tolist():
+            seeded = generators[i]
+            if seeded is not None:
+                self._generators[i], self._seeds[i] = seeded
         out = self._outputs()
         if self._started:  # Environments that the mask leaves out keep their last observation.
             out.observations[:] = self._observations
-        if self._random and not self._started:  # those without a seed
-            self._prepare(np.array([generator is None for generator in self._generators]))
-        if self._setup.solvers is NOT_LOADED:
+        if self._solvers == NOT_LOADED:
             self._load_solvers()
-        self._advance(1, mask, mask, self._no_actions, out)
+        self._begin(mask, out)
         self._started = True
-        self._begin_next(mask)
         self._finish(out)
         return out.observations, self._infos(out.infos, out.solver, mask)
 
@@ -299,52 +308,56 @@ class SharedControlVectorEnv(VectorEnv):
             Observations, rewards, terminations, truncations and infos, all new arrays.
 
         Raises:
-            ValueError: for a malformed action, naming the environment's index; nothing has moved then. Also
-                before the first reset, and for an ended environment where autoreset is disabled.
+            ValueError: for a malformed action, naming the environment's index where one is to blame; nothing has
+                moved then. Also before the first reset, and for an ended environment where the mode does not reset it.
+            ClosedEnvironmentError: after :meth:`close`.
         """
+        self._check_ready()
         checked = self._checked_actions(actions)
-        if not self._started:
-            raise ValueError("step() needs a reset() first")
-        if self._mode is AutoresetMode.DISABLED and self._batch.ended.any():
-            index = int(np.flatnonzero(self._batch.ended)[0])
-            raise ValueError(f"environment {index} has ended; reset it with options={{'reset_mask': ...}}")
         out = self._outputs()
-        self._drive(checked, out)
+        _, finals = self._drive(checked, out)
         self._finish(out)
-        infos = self._infos(out.infos, out.solver, np.ones(self.num_envs, dtype=bool))
-        ended = out.terminations | out.truncations
-        if self._mode is AutoresetMode.SAME_STEP and ended.any():
-            infos["final_obs"], infos["_final_obs"] = out.final_observations, ended
-            infos["final_info"] = self._infos(out.final_infos, out.final_solver, ended)
-            infos["_final_info"] = ended
+        infos = self._infos(out.infos, out.solver, self._everyone.copy())
+        if finals is not None:
+            ended = finals.terminations | finals.truncations
+            infos["final_obs"], infos["_final_obs"] = finals.observations, ended
+            infos["final_info"], infos["_final_info"] = self._infos(finals.infos, finals.solver, ended), ended
         return out.observations, out.rewards, out.terminations, out.truncations, infos
 
     def rollout(self, steps: int) -> Rollout:
-        """Drive many time steps without returning to Python between them; both slots must be bound.
+        """Drive many time steps; both slots must be bound.
+
+        Where nothing is drawn or drawn anew, and nothing is to be seen, all of them are taken without returning to
+        Python in between. Where autoreset is disabled, an environment whose episode ends stands still from then on.
 
         Args:
             steps: how many, in every environment.
 
         Raises:
-            ValueError: if a slot of the action is open, steps is below 1, or there was no reset.
+            ValueError: if a slot of the action is open, steps is below 1, there was no reset, or an environment has
+                ended already and the mode does not reset it.
+            ClosedEnvironmentError: after :meth:`close`.
         """
+        self._check_ready()
         if self._open:
             raise ValueError(f"rollout() needs limiter=True and driver=True; open are {list(self._open)}")
         if steps < 1:
             raise ValueError(f"steps = {steps} must be at least 1")
-        if not self._started:
-            raise ValueError("rollout() needs a reset() first")
         out = self._outputs()
-        if self._random:  # every episode begins with a draw
-            taken = [self._drive(self._no_actions, out) for _ in range(steps)]
-            result = Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
-        else:
+        if not self._random and self.render_mode is None and self._mode is not AutoresetMode.SAME_STEP:
             result = self._advance(steps, self._everyone, self._nobody, self._no_actions, out)
-        self._finish(out)
-        return result
+            self._finish(out)
+            return result
+        taken = []
+        for _ in range(steps):
+            taken.append(self._drive(self._no_actions, out)[0])
+            self._finish(out)
+        return Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Draw environment 0; in ``rgb_array`` mode a tuple of its frame."""
+        if not self._started:
+            raise ValueError("render() needs a reset() first")
         if self._viewer_env is None:
             make: Any = load_env_creator("shared_control_env.envs.shared_control:SharedControlEnv")
             self._viewer_env = make(plain(self._episodes[0]), render_mode=self.render_mode)
@@ -360,35 +373,50 @@ class SharedControlVectorEnv(VectorEnv):
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the viewer and end the threads."""
-        if self._viewer_env is not None:
-            self._viewer_env.close()
+        self._close_viewer()
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _configure(self, config: dict[str, Any] | Sequence[dict[str, Any]]) -> None:
-        """Change the settings of all environments, or those of each by one entry of a list."""
+    def _close_viewer(self) -> None:
+        if self._viewer_env is not None:
+            self._viewer_env.close()
+            self._viewer_env = None
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("the environments are closed; make new ones")
+
+    def _check_ready(self) -> None:
+        """Raise what keeps the environments from being driven on."""
+        self._check_open()
+        if not self._started:
+            raise ValueError("a reset() is needed first")
+        if self._mode is not AutoresetMode.NEXT_STEP and self._batch.ended.any():
+            index = int(np.flatnonzero(self._batch.ended)[0])
+            raise ValueError(f"environment {index} has ended; reset it with options={{'reset_mask': ...}}")
+
+    def _changed(self, config: dict[str, Any] | Sequence[dict[str, Any]]) -> tuple[Settings, list[Settings]]:
+        """Settings of all environments changed by a dict, or those of each by one entry of a list."""
         base = configuration.plain(self._settings)
         if isinstance(config, Mapping):
-            self._settings = configuration.check(configuration.merge(base, config))
-            self._templates = [self._settings] * self.num_envs
-        elif len(config) != self.num_envs:
+            settings = configuration.check(configuration.merge(base, config))
+            _check_for_kernel(settings)
+            return settings, [settings] * self.num_envs
+        if len(config) != self.num_envs:
             raise ValueError(
                 f"options['config'] has {len(config)} entries; it must be a dict or have one for each of "
                 f"{self.num_envs} environments"
             )
-        else:
-            different = {id(entry): entry for entry in config}
-            checked = {key: configuration.check(configuration.merge(base, entry)) for key, entry in different.items()}
-            templates = [checked[id(entry)] for entry in config]
-            for i, template in enumerate(templates):
-                for name in ONE_FOR_ALL:
-                    if getattr(template, name) != getattr(self._settings, name):
-                        raise ValueError(f"options['config'][{i}][{name!r}] must be that of all environments")
-                if len(template.vehicles) != len(self._settings.vehicles):
-                    raise ValueError(f"options['config'][{i}]['vehicles'] must have as many entries as in all")
-            self._templates = templates
-        self._viewer_env = None
-        self._set_up()
+        different = {id(entry): entry for entry in config}
+        checked = {key: configuration.check(configuration.merge(base, entry)) for key, entry in different.items()}
+        templates = [checked[id(entry)] for entry in config]
+        for i, template in enumerate(templates):
+            for name in ONE_FOR_ALL:
+                if getattr(template, name) != getattr(self._settings, name):
+                    raise ValueError(f"options['config'][{i}][{name!r}] must be that of all environments")
+            if len(template.vehicles) != len(self._settings.vehicles):
+                raise ValueError(f"options['config'][{i}]['vehicles'] must have as many entries as in all")
+        return self._settings, templates
 
     def _load_solvers(self) -> None:
         """Have all compiled that a step runs."""
@@ -396,30 +424,45 @@ class SharedControlVectorEnv(VectorEnv):
         def compile_kernel() -> None:
             self._advance(1, self._nobody, self._nobody, self._no_actions, self._outputs())
 
-        self._setup = self._setup._replace(solvers=cold_start.compile_all(compile_kernel, self._driver))
+        self._solvers = cold_start.compile_all(compile_kernel, self._driver)
+        self._setup = self._setup._replace(solvers=self._solvers)
 
-    def _prepare(self, mask: np.ndarray) -> None:
-        """Draw the next episode of the environments that the mask names."""
-        for i in np.flatnonzero(mask).tolist():
-            generator = self._generators[i]
-            if generator is None:
-                generator = self._generators[i] = seeding.np_random(None)[0]
-            self._prepared[i] = draw_episode(self._templates[i], generator)
-            _write_start(self._prepared[i], self._setup.starts, i)
+    def _generator(self, i: int) -> np.random.Generator:
+        """Generator of environment i, seeded at random unless it was given a seed."""
+        generator = self._generators[i]
+        if generator is None:
+            generator, self._seeds[i] = seeding.np_random(None)
+            self._generators[i] = generator
+        return generator
 
-    def _begin_next(self, mask: np.ndarray) -> None:
-        """Note that the environments that the mask names have begun what was prepared, and prepare the next."""
-        if self._random and mask.any():
-            for i in np.flatnonzero(mask).tolist():
-                self._episodes[i] = self._prepared[i]
-            self._prepare(mask)
+    def _begin(self, mask: np.ndarray, out: Outputs) -> None:
+        """Begin an episode in each environment that the mask names."""
+        self._draw(mask)
+        self._advance(1, mask, mask, self._no_actions, out)
 
-    def _drive(self, actions: Actions, out: Outputs) -> Rollout:
-        """One step of all environments."""
-        resetting = self._batch.ended.copy()
+    def _draw(self, mask: np.ndarray) -> None:
+        """Draw an episode for each environment that the mask names, if anything is random; all of them, or none."""
+        if self._random:
+            drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
+            for i, episode in drawn.items():
+                self._episodes[i] = episode
+                _write_start(episode, self._batch, i)
+
+    def _drive(self, actions: Actions, out: Outputs) -> tuple[Rollout, Outputs | None]:
+        """One step of all environments; also what episodes ended with that began anew in the same step, if any."""
+        if self._mode is AutoresetMode.NEXT_STEP:
+            self._draw(self._batch.ended)
         result = self._advance(1, self._everyone, self._nobody, actions, out)
-        self._begin_next(result.ends[0] if self._mode is AutoresetMode.SAME_STEP else resetting)
-        return result
+        ended = result.ends[0]
+        if self._mode is not AutoresetMode.SAME_STEP or not ended.any():
+            return result, None
+        finals = self._outputs()
+        for final, present in zip(finals, out, strict=True):
+            final[ended] = present[ended]
+        self._begin(ended, out)
+        for name in ("rewards", "terminations", "truncations"):
+            getattr(out, name)[ended] = getattr(finals, name)[ended]
+        return result, finals
 
     def _advance(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
         """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
@@ -445,16 +488,22 @@ class SharedControlVectorEnv(VectorEnv):
                 thread,
             )
 
-        others = [self._pool.submit(work, thread) for thread in range(1, self.threads)] if self._pool else []
-        work(0)
+        if self._process != os.getpid():  # threads do not live on in a forked process
+            self._open_pool()
+        others: list[Future[None]] = []
+        try:
+            if self._pool is not None:
+                others.extend(self._pool.submit(work, thread) for thread in range(1, self.threads))
+            work(0)
+        finally:
+            _await_all(others)
         for other in others:
             other.result()  # raises what it raised
         return Rollout(rewards, ends)
 
     def _outputs(self) -> Outputs:
-        """New arrays for one step; the final ones are large and made only where they are used."""
+        """New arrays for one step."""
         n = self.num_envs
-        finals = n if self._mode is AutoresetMode.SAME_STEP else 0
         return Outputs(
             observations=np.zeros((n, len(FEATURES)), dtype=np.float32),
             rewards=np.zeros(n),
@@ -462,9 +511,6 @@ class SharedControlVectorEnv(VectorEnv):
             truncations=np.zeros(n, dtype=bool),
             infos=np.zeros(n, INFO),
             solver=np.zeros(n, SOLVER),
-            final_observations=np.zeros((finals, len(FEATURES)), dtype=np.float32),
-            final_infos=np.zeros(finals, INFO),
-            final_solver=np.zeros(finals, SOLVER),
         )
 
     def _finish(self, out: Outputs) -> None:
@@ -491,10 +537,11 @@ class SharedControlVectorEnv(VectorEnv):
             )
         values = {DRIVER: self._no_actions.commands, AUTHORITY: self._no_actions.alphas}
         for slot in self._open:
-            array = np.array(given[slot], dtype=np.float64)
             size = SLOT_SPACES[slot].shape[0]
-            if array.shape != (self.num_envs, size):
-                raise ValueError(f"actions[{slot!r}] has shape {array.shape}; it must be ({self.num_envs}, {size})")
+            array = _numbers(given[slot])
+            if array is None or array.shape != (self.num_envs, size):
+                what = f"shape {array.shape}" if array is not None else f"the value {given[slot]!r}"
+                raise ValueError(f"actions[{slot!r}] has {what}; it must be numbers of shape ({self.num_envs}, {size})")
             finite = np.isfinite(array)
             if not finite.all():
                 index = int(np.argwhere(~finite)[0, 0])
@@ -508,31 +555,60 @@ class SharedControlVectorEnv(VectorEnv):
 
     def _checked_mask(self, mask: Any) -> np.ndarray:
         if mask is None:
-            return np.ones(self.num_envs, dtype=bool)
+            return self._everyone.copy()
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise ValueError(f"options['reset_mask'] = {mask!r} must be a bool array of shape ({self.num_envs},)")
         if not mask.any():
             raise ValueError("options['reset_mask'] names no environment; at least one entry must be True")
         if not self._started and not mask.all():
             raise ValueError("options['reset_mask'] must name every environment at the first reset")
-        return mask
+        return mask.copy()
 
-    def _take_seeds(self, seed: int | Sequence[int | None] | None, mask: np.ndarray) -> None:
-        """Seed the generators of the environments that the mask names, and draw their next episodes anew."""
+    def _seeded(self, seed: int | Sequence[int | None] | None) -> list[tuple[np.random.Generator, int] | None]:
+        """Generator and seed of each environment, None where none is given."""
         if seed is None:
-            return
+            return [None] * self.num_envs
         seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else list(seed)
         if len(seeds) != self.num_envs:
             raise ValueError(
                 f"seed has {len(seeds)} entries; it must be an int or have one for each of {self.num_envs}"
             )
-        generators = [None if value is None else seeding.np_random(int(value))[0] for value in seeds]
-        seeded = np.array([generator is not None for generator in generators]) & mask
-        for i in np.flatnonzero(seeded).tolist():
-            self._generators[i] = generators[i]
-        if self._random:
-            self._prepare(seeded)
-        self._seeds = tuple(new if chosen else old for new, old, chosen in zip(seeds, self._seeds, mask, strict=True))
+        for i, value in enumerate(seeds):
+            if value is not None and (not isinstance(value, int | np.integer) or value < 0):
+                raise ValueError(f"seed of environment {i} is {value!r}; it must be an integer from 0 on, or None")
+        return [None if value is None else seeding.np_random(int(value)) for value in seeds]
+
+
+def _check_for_kernel(settings: Settings) -> None:
+    """Raise ValueError for settings that the single environment alone has."""
+    if settings.other_vehicles_type != KERNEL_TRAFFIC:
+        raise ValueError(
+            f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} is not in the kernel; allowed is "
+            f"{KERNEL_TRAFFIC!r}; for others use gym.make_vec(..., vectorization_mode='sync')"
+        )
+    if len(settings.vehicles) > MAX_HOLES:
+        raise ValueError(f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}")
+
+
+def _await_all(futures: Sequence[Future[None]]) -> None:
+    """Wait until all are done, interrupts notwithstanding: threads left running would race with the next step."""
+    interrupt: KeyboardInterrupt | None = None
+    while not all(future.done() for future in futures):
+        try:
+            wait(futures)
+        except KeyboardInterrupt as error:
+            interrupt = error
+    if interrupt is not None:
+        raise interrupt
+
+
+def _numbers(value: Any) -> np.ndarray | None:
+    """A new array of real numbers, None where the value is something else."""
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return None
+    return array.astype(np.float64) if array.dtype.kind in "fiub" else None
 
 
 def _batched(records: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
@@ -545,12 +621,15 @@ def _batched(records: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
     return values
 
 
-def _no_starts(n: int, templates: Sequence[Settings]) -> Starts:
-    """Arrays for n starts, large enough for whatever any of the settings draws."""
+def _most(templates: Sequence[Settings]) -> tuple[int, int, int]:
+    """Most faults, rows of the reference line and vehicles that any of the settings draws."""
     different = list({id(template): template for template in templates}.values())
     faults = max(len(template.faults) + (1 if template.degradations else 0) for template in different)
-    rows = max(_most_rows(template) for template in different)
-    vehicles = len(different[0].vehicles)
+    return faults, max(_most_rows(template) for template in different), len(different[0].vehicles)
+
+
+def _starts(n: int, faults: int, rows: int, vehicles: int) -> Starts:
+    """Arrays for n starts."""
     return Starts(
         parameters=np.zeros(n, record_dtype(Parameters)),
         states=np.zeros((n, 6)),
@@ -571,7 +650,7 @@ def _most_rows(settings: Settings) -> int:
     return len(start_of(settings).line)
 
 
-def _write_start(settings: Settings, starts: Starts, i: int) -> None:
+def _write_start(settings: Settings, starts: Starts | Batch, i: int) -> None:
     """Write an episode's start as entry i; what is left of a line begins at infinity, of the faults is none."""
     start = start_of(settings)
     starts.parameters[i], starts.states[i] = start.parameters[()], start.ego

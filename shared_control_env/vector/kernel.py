@@ -12,12 +12,12 @@ from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.observation import observe
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, SPEED, Record, X, Y
-from shared_control_env.core.safe_area import whole_region
+from shared_control_env.core.safe_area import is_whole, whole_region
 from shared_control_env.core.scene import holes_in_region, perceive
 from shared_control_env.core.traffic import decide_acceleration, move
 from shared_control_env.vector import solvers
 from shared_control_env.vector.intrinsics import fetch_add
-from shared_control_env.vector.records import NEXT_STEP, SAME_STEP, Batch, Outputs, Setup
+from shared_control_env.vector.records import Batch, Outputs, Setup
 
 automate, drive = solvers.AUTOMATE.call, solvers.DRIVE.call
 triangulate, search = solvers.TRIANGULATE.call, solvers.SEARCH.call
@@ -29,9 +29,9 @@ TAKEN_AT_ONCE = 4
 
 @jit_inlined
 def find_area(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, setup: Setup, work: Record) -> None:
-    """Safe area of a scene; without a vehicle inside, the driving region itself is exact."""
+    """Safe area of a scene, as :func:`single.find_area`."""
     count = holes_in_region(traffic, line, scene.region, work.corners)
-    if count == 0:
+    if is_whole(count, scene.region, p.vehicle.width):
         whole_region(scene.region, scene.area)
         return
     n = triangulate(setup.solvers.triangulate, scene, count, work)
@@ -135,18 +135,18 @@ def copy_rows(source: np.ndarray, target: np.ndarray) -> None:
 
 @jit_inlined
 def restore(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
-    """Begin the episode that is prepared for environment i."""
+    """Begin an episode of environment i, whose drawn start is in the batch or whose fixed one is copied there."""
     starts = setup.starts
-    n = i % starts.parameters.shape[0]
-    batch.parameters[i] = starts.parameters[n]
-    copy_rows(starts.lines[n], batch.lines[i])
-    copy_rows(starts.traffic[n], batch.traffic[i])
-    for j in range(6):
-        batch.states[i, j] = starts.states[n, j]
-    for j in range(starts.faults.shape[1]):
-        batch.faults[i, j] = starts.faults[n, j]
-    for j in range(starts.plans.shape[1]):
-        batch.plans[i, j] = starts.plans[n, j]
+    if starts.parameters.shape[0] > 0:
+        batch.parameters[i] = starts.parameters[0]
+        copy_rows(starts.lines[0], batch.lines[i])
+        copy_rows(starts.traffic[0], batch.traffic[i])
+        for j in range(6):
+            batch.states[i, j] = starts.states[0, j]
+        for j in range(starts.faults.shape[1]):
+            batch.faults[i, j] = starts.faults[0, j]
+        for j in range(starts.plans.shape[1]):
+            batch.plans[i, j] = starts.plans[0, j]
     closed_loop.clear_faults(batch.fault_memories[i])
     batch.scenes[i].felt[0] = batch.scenes[i].felt[1] = 0.0
     batch.crashed[i] = batch.ended[i] = False
@@ -203,15 +203,6 @@ def advance_one(
 
 
 @jit_inlined
-def keep_final(i: int, out: Outputs) -> None:
-    """Keep what an episode ended with, before environment i is reset in the same step."""
-    for n in range(out.observations.shape[1]):
-        out.final_observations[i, n] = out.observations[i, n]
-    out.final_infos[i] = out.infos[i]
-    out.final_solver[i] = out.solver[i]
-
-
-@jit_inlined
 def advance_through(
     i: int,
     steps: int,
@@ -227,25 +218,16 @@ def advance_through(
     program: Record,
 ) -> None:
     """Advance environment i by some steps in a row; arguments as those of :func:`advance`."""
-    k = 0
-    resetting = resets[i] or (setup.autoreset == NEXT_STEP and batch.ended[i])
-    same_step = terminated = truncated = False
-    while k < steps:
-        advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
-        if same_step:
-            out.rewards[i], out.terminations[i], out.truncations[i] = rewards[k, i], terminated, truncated
-        else:
-            rewards[k, i] = out.rewards[i]
-            terminated, truncated = out.terminations[i], out.truncations[i]
-            ends[k, i] = terminated or truncated
-        same_step = not same_step and ends[k, i] and setup.autoreset == SAME_STEP
-        if same_step:
-            keep_final(i, out)
+    resetting = resets[i]
+    for k in range(steps):
+        if batch.ended[i] and not resetting:
+            if not setup.autoreset:
+                break
             resetting = True
-            continue
-        batch.ended[i] = ends[k, i] and setup.autoreset != SAME_STEP
-        resetting = setup.autoreset == NEXT_STEP and batch.ended[i]
-        k += 1
+        advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
+        rewards[k, i] = out.rewards[i]
+        ends[k, i] = batch.ended[i] = out.terminations[i] or out.truncations[i]
+        resetting = False
 
 
 @jit
@@ -265,7 +247,7 @@ def advance(
     programs: np.ndarray,
     thread: int,
 ) -> None:
-    """Advance the environments, each by some steps in a row, resetting as the autoreset mode says.
+    """Advance the environments, each by some steps in a row.
 
     As many threads as there are shares of the environments call it; each first takes those of its own share, which
     its core's cache may hold from the step before, then helps with the other shares.

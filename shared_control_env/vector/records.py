@@ -10,9 +10,6 @@ from shared_control_env.core import active_set_qp, condensing, delaunay
 from shared_control_env.core.active_set_qp import MAX_ROWS, MAX_VARIABLES
 from shared_control_env.core.delaunay import MAX_TRIANGLES
 
-NEXT_STEP, SAME_STEP, DISABLED = range(3)
-"""Codes of Gymnasium's autoreset modes."""
-
 
 class Batch(NamedTuple):
     """State of N environments, one entry each.
@@ -49,7 +46,7 @@ class Batch(NamedTuple):
 
 
 class Starts(NamedTuple):
-    """What the next episode of each environment starts from: N entries, or one for all where nothing is drawn.
+    """What every episode starts from, one entry; none where episodes are drawn, whose starts are in the batch already.
 
     Attributes:
         parameters, states, lines, faults, traffic, plans: as those of :class:`Batch`.
@@ -84,13 +81,13 @@ class Setup(NamedTuple):
     """What all environments share.
 
     Attributes:
-        starts: of the next episodes.
+        starts: of the episodes.
         steps: length of an episode in decisions.
         frames: simulation steps of one decision.
         dt: of a simulation step [s].
         limiter: whether the fuzzy inference decides alpha_a.
         driver: whether the predictive driver decides the driver's command.
-        autoreset: :data:`NEXT_STEP`, :data:`SAME_STEP` or :data:`DISABLED`.
+        autoreset: whether the step after an episode's end begins the next; if not, the environment stands still.
         solvers: where the compiled solvers are.
     """
 
@@ -100,7 +97,7 @@ class Setup(NamedTuple):
     dt: float
     limiter: bool
     driver: bool
-    autoreset: int
+    autoreset: bool
     solvers: Addresses
 
 
@@ -113,7 +110,6 @@ class Outputs(NamedTuple):
         terminations, truncations: (N,).
         infos: records of :data:`info.INFO`, (N,).
         solver: records of :data:`SOLVER`, the driver's, (N,).
-        final_observations, final_infos, final_solver: those at the end of an episode that was reset in the same step.
     """
 
     observations: np.ndarray
@@ -122,9 +118,6 @@ class Outputs(NamedTuple):
     truncations: np.ndarray
     infos: np.ndarray
     solver: np.ndarray
-    final_observations: np.ndarray
-    final_infos: np.ndarray
-    final_solver: np.ndarray
 
 
 SOLVER = np.dtype(

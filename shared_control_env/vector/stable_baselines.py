@@ -16,35 +16,46 @@ from shared_control_env.vector.environment import SharedControlVectorEnv
 class StableBaselinesVecEnv(VecEnv):
     """A :class:`SharedControlVectorEnv` as Stable-Baselines3 takes it.
 
-    Its ``infos`` hold what its algorithms read, at the end of an episode: ``terminal_observation`` and
-    ``TimeLimit.truncated``. The signals of the loop stay arrays, in the attribute ``signals``.
+    Its ``infos`` are filled at the end of an episode: ``terminal_observation`` and ``TimeLimit.truncated``, which its
+    algorithms read, and the signals of the last step. Of all other steps the signals stay arrays, in the attribute
+    ``signals``. Options of :meth:`set_options` are those of the environment: ``{"config": {...}}``.
 
     Args:
         env: of :func:`gymnasium.make_vec`, with ``autoreset_mode="same_step"``.
 
     Raises:
-        ValueError: for another environment or autoreset mode.
+        ValueError: for another environment, a wrapped one (wrap this one, by ``VecNormalize`` and the like), or another
+            autoreset mode.
     """
 
     def __init__(self, env: gym.vector.VectorEnv) -> None:
-        bare = env.unwrapped
-        if not isinstance(bare, SharedControlVectorEnv):
-            raise ValueError(f"env = {env} must be a SharedControlVectorEnv")
-        if bare.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
+        if not isinstance(env, SharedControlVectorEnv):
+            raise ValueError(f"env = {env} must be a SharedControlVectorEnv that nothing is wrapped around")
+        if env.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
             raise ValueError("env must be made with autoreset_mode='same_step', which Stable-Baselines3 expects")
-        self.env = bare
+        self.env = env
         self.signals: dict[str, Any] = {}
-        self.render_mode = bare.render_mode
-        super().__init__(bare.num_envs, bare.single_observation_space, bare.single_action_space)
+        self.render_mode = env.render_mode
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> np.ndarray:
-        """Observations of new episodes, with the seeds given by :meth:`seed`."""
-        seeds = list(self._seeds) if any(seed is not None for seed in self._seeds) else None
-        observations, self.signals = self.env.reset(seed=seeds)
+        """Observations of new episodes, with the seeds and options given by :meth:`seed` and :meth:`set_options`."""
+        observations, self.signals = self.env.reset(seed=self._seeds, options=self._joint_options())
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._reset_seeds()
         self._reset_options()
         return observations
+
+    def _joint_options(self) -> dict[str, Any]:
+        """Options of all environments as those of the one that holds them."""
+        if not any(self._options):
+            return {}
+        unknown = {key for options in self._options for key in options} - {"config"}
+        if unknown:
+            raise ValueError(f"options has the unknown key(s) {sorted(unknown)}; valid is 'config'")
+        configs = [options.get("config", {}) for options in self._options]
+        alike = all(config == configs[0] for config in configs)
+        return {"config": configs[0] if alike else configs}
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions for :meth:`step_wait`."""
@@ -55,11 +66,10 @@ class StableBaselinesVecEnv(VecEnv):
         observations, rewards, terminations, truncations, self.signals = self.env.step(self._actions)
         dones = terminations | truncations
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        for i in np.flatnonzero(dones):
-            infos[i] = {
-                "terminal_observation": self.signals["final_obs"][i],
-                "TimeLimit.truncated": bool(truncations[i] and not terminations[i]),
-            }
+        for i in np.flatnonzero(dones).tolist():
+            infos[i] = _of_one(self.signals["final_info"], i)
+            infos[i]["terminal_observation"] = self.signals["final_obs"][i]
+            infos[i]["TimeLimit.truncated"] = bool(truncations[i] and not terminations[i])
         return observations, rewards.astype(np.float32), dones, infos
 
     def close(self) -> None:
@@ -67,9 +77,8 @@ class StableBaselinesVecEnv(VecEnv):
         self.env.close()
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """The picture of environment 0; the others have none."""
-        frames = self.env.render() or (None,)
-        return [*frames, *[None] * (self.num_envs - 1)]
+        """The picture of environment 0 alone."""
+        return self.env.render() or ()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute, the same for every environment."""
@@ -86,3 +95,12 @@ class StableBaselinesVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: Any = None) -> list[bool]:
         """No environment is wrapped."""
         return [False for _ in self._get_indices(indices)]
+
+
+def _of_one(infos: dict[str, Any], i: int) -> dict[str, Any]:
+    """What infos say of environment i, without their masks."""
+    return {
+        name: _of_one(values, i) if isinstance(values, dict) else values[i]
+        for name, values in infos.items()
+        if not name.startswith("_")
+    }

@@ -15,7 +15,8 @@ FIELD = LateralRiskParameters()
 
 def find(holes, region=REGION, d=0.0, width=2.0):
     area = np.zeros(1, SAFE_AREA)[0]
-    sa.find_safe_area(np.asarray(region, dtype=float), d, np.asarray(holes, dtype=float).reshape(-1, 4, 2), width, area)
+    triangles = sa.triangulate(*region, np.asarray(holes, dtype=float).reshape(-1, 4, 2))
+    sa.search_triangles(triangles, region[0], region[1], d, width, sa.new_scratch(len(triangles)), area)
     return area
 
 

@@ -10,13 +10,17 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import shared_control_env  # noqa: F401
 from shared_control_env.core.authority import LAWS
+from shared_control_env.core.degradation import KINDS
+from shared_control_env.core.safe_area import BLOCKED
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.envs.cases import TWO_LANE as CASE
+from shared_control_env.envs.config import WITHOUT_SIZE
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.vector.environment import SharedControlVectorEnv
 from shared_control_env.vector.kernel import TAKEN_AT_ONCE
 from shared_control_env.wrappers import DriverModel
+from tests.vector.agreement import assert_same_info, at, compare, flat, gentle_driver, random_driver
 
 IDS = ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"]
 TWO_LANE = "SharedControl/TwoLane-v0"
@@ -29,48 +33,6 @@ FAULTS = {
 }
 
 
-def flat(info, prefix=""):
-    """Nested info as {path: value}, masks left out."""
-    values = {}
-    for key, value in info.items():
-        if not key.startswith("_"):
-            path = f"{prefix}{key}"
-            values.update(flat(value, f"{path}/") if isinstance(value, dict) else {path: value})
-    return values
-
-
-def assert_same_info(infos, single, index):
-    many = flat({key: value for key, value in infos.items() if not key.startswith("final_")})
-    one = flat(single)
-    assert many.keys() == one.keys()
-    for path, value in one.items():
-        np.testing.assert_allclose(many[path][index], value, rtol=0.0, atol=1e-9, err_msg=path)
-
-
-def compare(single, many, policy, seed=0, index=2):
-    """Whole episode of the single environment against environment ``index`` of the vectorised one."""
-    rng = np.random.default_rng(seed)
-    observation, info = single.reset(seed=seed)
-    observations, infos = many.reset(seed=seed)
-    np.testing.assert_allclose(observations[index], observation, atol=1e-9)
-    assert_same_info(infos, info, index)
-    steps, done = 0, False
-    while not done:
-        actions = policy(rng, many)
-        observation, reward, terminated, truncated, info = single.step(actions[index])
-        observations, rewards, terminations, truncations, infos = many.step(actions)
-        np.testing.assert_allclose(observations[index], observation, rtol=0.0, atol=1e-9)
-        assert rewards[index] == pytest.approx(reward, abs=1e-9)
-        assert (terminations[index], truncations[index]) == (terminated, truncated)
-        assert_same_info(infos, info, index)
-        steps, done = steps + 1, terminated or truncated
-    return steps
-
-
-def random_driver(rng, many):
-    return (0.15 * rng.normal(size=(many.num_envs, 2))).clip(-1, 1).astype(np.float32)
-
-
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("name", IDS)
@@ -78,7 +40,7 @@ def test_same_as_the_single_environment(name, fault, law):
     config = {"faults": FAULTS[fault], "authority": {"law": law}, "duration": 6.0}
     single = gym.make(name, config=config)
     many = gym.make_vec(name, num_envs=3, config=config)
-    assert compare(single, many, random_driver, seed=len(fault) + len(law)) > 10
+    assert compare(single, many, random_driver, seed=len(fault) + len(law))[0] > 10
 
 
 @pytest.mark.parametrize("degradation", DEGRADATIONS)
@@ -86,8 +48,34 @@ def test_same_as_the_single_environment(name, fault, law):
 def test_same_in_every_scenario_under_every_degradation(name, degradation):
     config = {"degradations": [degradation], "duration": 4.0, "authority": {"law": "proportional"}}
     single, many = gym.make(name, config=config), gym.make_vec(name, num_envs=2, config=config)
-    gentle = lambda rng, many: (0.03 * rng.normal(size=(many.num_envs, 2))).astype(np.float32)
-    assert compare(single, many, gentle, seed=len(name), index=0) > 10
+    assert compare(single, many, gentle_driver, seed=len(name), index=0)[0] > 10
+
+
+@pytest.mark.parametrize("law", ["proportional", "driver_only"])
+@pytest.mark.parametrize("name", ["SharedControl/LeadBraking-v0", "SharedControl/CutIn-v0"])
+def test_same_close_behind_others_and_in_collisions(name, law):
+    # Beside a vehicle just ahead the free region is a rectangle, whose triangulation is not unique.
+    config = {"authority": {"law": law}, "simulation_frequency": 60}
+    single, many = gym.make(name, config=config), gym.make_vec(name, num_envs=2, config=config)
+    lengths = compare(single, many, random_driver, seed=1, index=0, episodes=15)
+    assert min(lengths) < 150  # some end in a collision or off the road
+
+
+@pytest.mark.parametrize("config", [{"vehicle": {"width": 4.2}}, {"road": {"lane_width": 1.9}, "vehicles": []}])
+def test_same_where_the_lane_is_narrower_than_the_vehicle(config):
+    single, many = gym.make(TWO_LANE, config=config), gym.make_vec(TWO_LANE, num_envs=3, config=config)
+    assert single.reset(seed=0)[1]["safe_area_outcome"] == BLOCKED
+    compare(single, many, gentle_driver)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS[1:] if kind not in WITHOUT_SIZE])
+def test_same_in_episodes_that_begin_anew_under_a_degradation(kind):
+    # What a degradation remembers of one episode must not act in the next.
+    channel = None if kind == "lane_offset" else "steering"
+    fault = {"kind": kind, "onset": 0.0, "size": 0.1, "seed": 1, **({"channel": channel} if channel else {})}
+    config = {"faults": [fault], "duration": 0.6, "authority": {"law": "none"}}
+    single, many = gym.make(TWO_LANE, config=config), gym.make_vec(TWO_LANE, num_envs=3, config=config)
+    assert compare(single, many, random_driver, episodes=3) == [12, 12, 12]
 
 
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])
@@ -152,8 +140,7 @@ def test_a_drawn_episode_is_shown_as_it_is():
 @pytest.mark.parametrize("name", IDS)
 def test_same_over_a_full_episode_at_finer_simulation_steps(name):
     config = {"faults": FAULTS["steering"], "simulation_frequency": 60, "longitudinal_risk": {"preset": "paper"}}
-    gentle = lambda rng, many: (0.02 * rng.normal(size=(many.num_envs, 2))).astype(np.float32)
-    assert compare(gym.make(name, config=config), gym.make_vec(name, num_envs=3, config=config), gentle) > 40
+    assert compare(gym.make(name, config=config), gym.make_vec(name, num_envs=3, config=config), gentle_driver)[0] > 40
 
 
 def test_same_where_vehicles_reach_into_the_driving_region():
@@ -173,8 +160,7 @@ def test_same_where_vehicles_reach_into_the_driving_region():
             vehicle.array[:] = row
 
     single.unwrapped._place_vehicles = place_across
-    gentle = lambda rng, many: (0.03 * rng.normal(size=(many.num_envs, 2))).astype(np.float32)
-    assert compare(single, many, gentle) > 15
+    assert compare(single, many, gentle_driver)[0] > 15
     outline = many.step(np.zeros((3, 2)))[4]["safe_area_upper"]
     assert np.ptp(outline[0, :, 1]) > 0.1  # the boundary does bend around a vehicle
 
@@ -274,13 +260,6 @@ def test_autoreset_follows_gymnasiums_own(mode):
                 assert a[-1]["final_info"]["t"][i] == b[-1]["final_info"]["t"][i]
 
 
-def at(value, index):
-    """Environment ``index`` of a nested info."""
-    if isinstance(value, dict):
-        return {k: at(v, index) for k, v in value.items() if not k.startswith("_")}
-    return value[index]
-
-
 def test_reset_mask_touches_the_named_environments_alone():
     env = gym.make_vec(TWO_LANE, num_envs=3)
     env.reset(seed=0)
@@ -304,7 +283,7 @@ def test_spaces_seeds_and_infos():
     observations, infos = env.reset(seed=[5, 6, 7, None])
     np.testing.assert_array_equal(env.action_space.sample(), first)
     assert env.observation_space.contains(observations)
-    assert env.unwrapped.np_random_seed == (5, 6, 7, None)
+    assert env.unwrapped.np_random_seed[:3] == (5, 6, 7)
     for path, value in flat(infos).items():
         assert value.dtype != object, path
         assert len(value) == 4
@@ -359,14 +338,19 @@ def test_a_bad_action_names_its_environment_and_moves_nothing(bad):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda env: env.step(np.zeros((5, 2))), r"shape \(5, 2\); it must be \(3, 2\)"),
+        (lambda env: env.step(np.zeros((5, 2))), r"shape \(5, 2\); it must be numbers of shape \(3, 2\)"),
+        (lambda env: env.step([[0.0, 0.0], [0.0], [0.0, 0.0]]), "must be numbers"),
+        (lambda env: env.step([["a", "b"]] * 3), "must be numbers"),
+        (lambda env: env.step(np.zeros((3, 2), dtype=complex)), "must be numbers"),
         (lambda env: env.reset(seed=[1, 2]), "seed has 2 entries"),
+        (lambda env: env.reset(seed=[1, 2.5, 3]), "seed of environment 1 is 2.5"),
+        (lambda env: env.reset(seed=[1, 2, -3]), "seed of environment 2 is -3"),
         (lambda env: env.reset(options={"maks": 1}), "unknown key"),
         (lambda env: env.reset(options={"reset_mask": [True] * 3}), "bool array"),
         (lambda env: env.reset(options={"reset_mask": np.zeros(3, dtype=bool)}), "names no environment"),
         (lambda env: env.reset(options={"config": {"duratoin": 1.0}}), "duration"),
         (lambda env: env.unwrapped.rollout(3), "open are"),
-        (lambda env: gym.make_vec(TWO_LANE, num_envs=2, driver=True).unwrapped.rollout(3), "needs a reset"),
+        (lambda env: gym.make_vec(TWO_LANE, num_envs=2, driver=True).unwrapped.rollout(3), "reset\\(\\) is needed"),
     ],
 )
 def test_refused(call, message):
@@ -383,6 +367,7 @@ def test_refused(call, message):
         ({"threads": 0}, "threads = 0"),
         ({"driver": object()}, "must be True or False"),
         ({"autoreset_mode": "sometimes"}, "one of"),
+        ({"render_mode": "ansi"}, "render_mode = 'ansi'"),
         ({"config": {"other_vehicles_type": "highway_env.vehicle.behavior.IDMVehicle"}}, "not in the kernel"),
         ({"config": {"vehicles": [{"lane": 1, "position": 9.0 * i, "speed": 9.0} for i in range(9)]}}, "0 to 8"),
         ({"config": {"authority": {"law": "papr"}}}, "'paper'"),
@@ -408,5 +393,6 @@ def test_starts_without_highway_env():
     assert result.stdout.strip() == "[]"
 
 
-def test_memory_of_an_environment():
-    assert gym.make_vec(TWO_LANE, num_envs=64).unwrapped.bytes_per_environment <= 4096
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_memory_of_an_environment(name):
+    assert gym.make_vec(name, num_envs=64).unwrapped.bytes_per_environment <= 4096

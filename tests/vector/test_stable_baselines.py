@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the extra 'train'")
 
 from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize, VecVideoRecorder
 
 import shared_control_env  # noqa: F401
 from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
@@ -14,10 +14,12 @@ TWO_LANE = "SharedControl/TwoLane-v0"
 CONFIG = {"duration": 1.0}
 
 
+def bare(n=4, **options):
+    return gym.make_vec(TWO_LANE, num_envs=n, autoreset_mode="same_step", config=CONFIG, **options)
+
+
 def make(n=4, **options):
-    return StableBaselinesVecEnv(
-        gym.make_vec(TWO_LANE, num_envs=n, autoreset_mode="same_step", config=CONFIG, **options)
-    )
+    return StableBaselinesVecEnv(bare(n, **options))
 
 
 def test_same_as_stable_baselines_own_over_the_single_environment():
@@ -41,13 +43,15 @@ def test_same_as_stable_baselines_own_over_the_single_environment():
 
 
 def test_monitor_counts_episodes():
-    env = VecMonitor(make())
+    env = VecNormalize(VecMonitor(make(), info_keywords=("crashed", "speed")))
     env.reset()
-    lengths = []
+    episodes = []
     for _ in range(45):
         infos = env.step(np.zeros((4, 2), dtype=np.float32))[3]
-        lengths += [info["episode"]["l"] for info in infos if "episode" in info]
-    assert lengths == [20] * 8
+        episodes += [info["episode"] for info in infos if "episode" in info]
+    assert [episode["l"] for episode in episodes] == [20] * 8
+    assert {bool(episode["crashed"]) for episode in episodes} == {False}
+    assert all(5.0 < episode["speed"] < 30.0 for episode in episodes)
 
 
 def test_ppo_learns_on_it_and_repeats():
@@ -64,13 +68,38 @@ def test_refused():
         StableBaselinesVecEnv(gym.make_vec(TWO_LANE, num_envs=2))
     with pytest.raises(ValueError, match="SharedControlVectorEnv"):
         StableBaselinesVecEnv(gym.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync"))
+    with pytest.raises(ValueError, match="nothing is wrapped around"):
+        StableBaselinesVecEnv(gym.vector.VectorWrapper(bare()))
     with pytest.raises(ValueError, match="config"):
         make().set_attr("config", {})
+
+
+def test_options_change_the_settings():
+    env = make()
+    env.set_options({"config": {"ego": {"speed": 9.0}}})
+    env.reset()
+    assert (env.signals["state"][:, 3] == 9.0).all()
+    env.set_options([{"config": {"ego": {"speed": speed}}} for speed in (9.0, 10.0, 11.0, 12.0)])
+    env.reset()
+    np.testing.assert_array_equal(env.signals["state"][:, 3], [9.0, 10.0, 11.0, 12.0])
+    env.set_options({"confg": {}})
+    with pytest.raises(ValueError, match="confg"):
+        env.reset()
+
+
+def test_videos_are_recorded(tmp_path):
+    env = VecVideoRecorder(make(3, render_mode="rgb_array"), str(tmp_path), lambda step: step == 0, video_length=5)
+    env.reset()
+    for _ in range(6):
+        env.step(np.zeros((3, 2), dtype=np.float32))
+    env.close()
+    assert [path.suffix for path in tmp_path.iterdir()] == [".mp4"]
 
 
 def test_images_and_attributes():
     env = make(3, render_mode="rgb_array")
     env.reset()
     assert env.get_images()[0].ndim == 3
+    assert env.render().shape == env.get_images()[0].shape
     assert env.get_attr("threads") == [env.env.threads] * 3
     assert env.env_is_wrapped(gym.Wrapper) == [False] * 3

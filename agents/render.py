@@ -99,12 +99,12 @@ def main(
     path = out or Path("results/videos") / f"{scenario}-{degradation}-{seed}.mp4"
     if path.suffix != ".mp4":
         raise typer.BadParameter(f"out = {path} must end with .mp4")
-    if path.exists():
-        raise typer.BadParameter(f"{path} exists already; choose another --out")
     pairs = [pair.strip().partition(":") for pair in drivers.split(",")]
     try:
         choose("scenario", scenario, CASES)
         choose("degradation", degradation, DEGRADATIONS)
+        if path.exists():
+            raise ValueError(f"{path} exists already; remove it, or choose another --out")
         drives = []
         columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn())
         with Progress(*columns, console=console) as bar:

@@ -237,8 +237,11 @@ def main(
 def run(training: Training, steps: int, console: Console) -> None:
     """Learn segments until there are so many steps, and show it."""
     columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    whole = -(-steps // training.segment) * training.segment
+    if whole > steps:
+        console.print(f"{steps:,} steps are rounded up to {whole:,}: segments of {training.segment:,} are learned.")
     with Progress(*columns, console=console) as bar:
-        progress = bar.add_task("steps", total=steps, completed=training.state["steps"])
+        progress = bar.add_task("steps", total=whole, completed=training.state["steps"])
         while training.state["steps"] < steps:
             training.run_segment(lambda n: bar.advance(progress, n))
             console.print(f"{training.state['steps']:,} steps: mean return {training.state['scores'][-1][1]:.1f}")

@@ -76,6 +76,10 @@ def _vectors(report: Callable[..., None], peer: Timing, single: Timing, repeats:
                 report(
                     f"kernel, N = {n}, {who}, all cores", str(every), rate, "1.9 x on two cores" if n == 1024 else ""
                 )
+    for id in ("SharedControl/LeadBraking-v0", "SharedControl/DenseTraffic-v0"):
+        one = vectors.kernel(256, False, max(3, repeats // 5), id).one
+        what = f"kernel, N = 256, {id.removeprefix('SharedControl/')}, 1 core, draws of episodes included"
+        report(what, str(one), f"{1.0 / one.median:,.0f}/s", "")
     report("memory of an environment", f"{vectors.bytes_per_environment():,} B", "", "4,096 B")
     for name, timing in parts.times(repeats).items():
         report(f"part: {name}", str(timing), "", "")

@@ -38,15 +38,15 @@ class Scaling(NamedTuple):
     ratio: float
 
 
-def kernel(num_envs: int, driver: bool, repeats: int) -> Scaling:
+def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/TwoLane-v0") -> Scaling:
     """Random driver commands, or the driver's program in the kernel.
 
     A round times every core by itself, and all together after each, since on a shared machine the cores differ, and
     change their speeds from one second to the next; all environments get equally far in their episodes.
     """
     ours = cores()
-    alone = _block(num_envs, 1, driver)
-    everywhere = _block(num_envs, len(ours), driver) if min(len(ours), num_envs) > 1 else None
+    alone = _block(id, num_envs, 1, driver)
+    everywhere = _block(id, num_envs, len(ours), driver) if min(len(ours), num_envs) > 1 else None
     one, every, ratios = [], [], []
     for _ in range(repeats):
         for core in ours:
@@ -68,10 +68,10 @@ def cores() -> list[int]:
     return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
 
 
-def _block(num_envs: int, threads: int, driver: bool) -> Callable[[], float]:
+def _block(id: str, num_envs: int, threads: int, driver: bool) -> Callable[[], float]:
     """Some steps of new environments; the first are taken at once, unmeasured."""
     config = {"solver": {"iterations": ITERATIONS}}
-    env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=num_envs, threads=threads, driver=driver, config=config)
+    env = gym.make_vec(id, num_envs=num_envs, threads=threads, driver=driver, config=config)
     env.reset(seed=0)
     actions = 0.1 * np.random.default_rng(0).normal(size=(num_envs, 2)).clip(-1, 1)
     steps = max(2, BLOCK // num_envs)
@@ -100,7 +100,7 @@ def _on_core(core: int, block: Callable[[], float]) -> float:
 
 def highway_processes(repeats: int) -> Timing:
     """highway-env in one process a core, time of one environment's step."""
-    n = os.cpu_count() or 1
+    n = len(cores())
 
     def make() -> gym.Env:
         import highway_env

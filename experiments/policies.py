@@ -73,11 +73,14 @@ def train_all(jobs: int, console: Console) -> None:
     with Progress(*columns, console=console) as bar, ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
         progress = bar.add_task("steps", total=sum(STEPS[task] for task, _ in runs))
         waiting = {pool.submit(train, task, seed, STEPS[task]) for task, seed in runs}
-        while waiting:
-            done, waiting = wait(waiting, timeout=2.0)
-            for future in done:
-                future.result()
-            bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=2.0)
+                for future in done:
+                    future.result()
+                bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
+        finally:
+            pool.shutdown(cancel_futures=True)  # an interrupt ends what is running; nothing else is to begin
 
 
 def draw_curves(path: Path) -> None:
@@ -183,8 +186,12 @@ def main(
 ) -> None:
     """Train, compare, and replace what ships; stopped, it goes on where it was."""
     console = Console()
-    train_all(jobs, console)
-    publish(seeds, jobs, console)
+    try:
+        train_all(jobs, console)
+        publish(seeds, jobs, console)
+    except KeyboardInterrupt:
+        console.print(f"Stopped; what was trained until then is kept in {FOLDER}. The same command goes on.")
+        raise typer.Exit(130) from None
 
 
 if __name__ == "__main__":

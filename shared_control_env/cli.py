@@ -29,7 +29,7 @@ from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
-COLUMNS = ("collisions", "lateral_rms", "driver_effort", "conflict")
+COLUMNS = ("collisions", "road_departures", "lateral_rms", "driver_effort", "conflict")
 """Metrics of the table that is printed; all are in the report."""
 
 
@@ -86,8 +86,12 @@ def benchmark(
             raise typer.BadParameter(str(error)) from None
         except OSError as error:
             bar.stop()
-            console.print(f"[red]{error}[/]: what was done until then is kept in {out}; start again to go on.")
+            console.print(f"[red]{error}[/]: what could be written until then is in {out}; start again to go on.")
             raise typer.Exit(1) from None
+        except KeyboardInterrupt:
+            bar.stop()
+            console.print(f"Stopped; what was done until then is kept in {out}. The same command goes on.")
+            raise typer.Exit(130) from None
     console.print(summary(table))
     console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.")
 
@@ -123,6 +127,8 @@ def replay(
         entries = choose("driver", driver, DRIVERS)[driver], choose("authority", authority, AUTHORITIES)[authority]
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+    if video is not None and video.suffix != ".mp4":
+        raise typer.BadParameter(f"video = {video} must end with .mp4")
     if video is not None and video.exists():
         raise typer.BadParameter(f"{video} exists already; choose another name")
     given = None if degradation == AS_GIVEN else degradation

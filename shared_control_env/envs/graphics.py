@@ -103,14 +103,14 @@ class SharedControlViewer(EnvViewer):
         pygame.draw.polygon(self.sim_surface, INK, diamond, 1)
 
     def _draw_panel(self) -> None:
-        """Gauges of risk and authority on the left, of the commands on the right."""
-        env, signals = self.env, self.env.signals
+        """Gauges of risk and authority on the left, of the commands on the right, all of the step that led here."""
+        env, noted = self.env, self.env.noted
         width, top = self.frame_surface.get_width(), self.frame_surface.get_height() - PANEL_HEIGHT
         pygame.draw.rect(self.frame_surface, BACKGROUND, (0, top, width, PANEL_HEIGHT))
         self._write(
             f"t = {env.scene['t']:.2f} s     v = {env.vehicle.speed:.1f} m/s     "
             f"y = {env.scene['z'][1] - env.scene['y_target']:+.2f} m     law: {env.settings.authority.law}     "
-            f"fault: {'active' if env.fault_active else 'none'}",
+            f"fault: {'active' if noted['fault_active'] else 'none'}",
             (14, top + 10),
         )
         for i, (name, key, colour) in enumerate(
@@ -120,13 +120,13 @@ class SharedControlViewer(EnvViewer):
                 ("authority alpha_a", "alpha_a", AUTHORITY),
             )
         ):
-            self._bar(name, float(signals[key]), (14, top + 42 + 36 * i), 0.32 * width, colour, False)
+            self._bar(name, float(noted[key]), (14, top + 42 + 36 * i), 0.32 * width, colour, False)
         limits = env.parameters["limits"]
         for channel, (title, unit, bound, shown) in enumerate(
             (
                 ("acceleration", "m/s2", float(limits["a_max"]), 1.0),
                 # A bar to the left is steering to the left, which is positive.
-                ("steering", "deg left", -float(limits["delta_max"]), 180.0 / np.pi),
+                ("steering", "deg to the left", -float(limits["delta_max"]), 180.0 / np.pi),
             )
         ):
             left = (0.37 + 0.32 * channel) * width
@@ -138,7 +138,7 @@ class SharedControlViewer(EnvViewer):
                     ("driver", "u_h_act", DRIVER),
                 )
             ):
-                value = float(signals[key][channel])
+                value = float(noted[key][channel])
                 label = f"{title}, {name}: {round(value * shown, 2) + 0.0:+.2f} {unit}"
                 self._bar(label, value / bound, (left, top + 42 + 36 * i), 0.3 * width, colour, True)
 

@@ -12,7 +12,6 @@ from highway_env.vehicle.graphics import VehicleGraphics
 
 from shared_control_env.controllers.automation import Automation
 from shared_control_env.core import delaunay, single
-from shared_control_env.core.degradation import has_set_in
 from shared_control_env.core.info import INFO, as_dict
 from shared_control_env.core.records import FAULT_MEMORY, HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
 from shared_control_env.core.reward import TERMS
@@ -51,6 +50,7 @@ class SharedControlEnv(AbstractEnv):
         command_limits: largest acceleration and steering [m/s^2, rad], shape (2,).
         automation: any object with ``reset()`` and ``act(scene) -> Solution``.
         observation: the last observation.
+        noted: record of :data:`info.INFO` of the last step, or reset.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
@@ -63,6 +63,7 @@ class SharedControlEnv(AbstractEnv):
         self.scene = np.zeros((), SCENE)
         self.signals = np.zeros((), SIGNALS)
         self.memory = np.zeros((), MEMORY)
+        self.noted = np.zeros((), INFO)
         self._triangulation = np.zeros((), delaunay.WORKSPACE)
         super().__init__(config=config, render_mode=render_mode)
 
@@ -210,7 +211,7 @@ class SharedControlEnv(AbstractEnv):
         command, alpha_a = self.action_type.decode(action)
         last_a, previous_s = float(self.memory["u"][0]), float(self.scene["z"][0])
         single.blend(command, alpha_a, self.parameters, self.scene, self.memory, self.signals)
-        info = self._note_signals()
+        info = self.noted = self._note_signals()
         self._simulate(self.signals["u"])
         self._perceive_and_plan()
         reward, terminated = single.conclude(
@@ -250,14 +251,9 @@ class SharedControlEnv(AbstractEnv):
 
     def _info(self, obs: Any = None, action: Any = None) -> dict[str, Any]:
         """Info of a reset; highway-env's own also carries an unseeded sample of the action, which is left out."""
-        info = self._note_signals()
+        info = self.noted = self._note_signals()
         single.note_start(self.scene, self.parameters, self.memory, info)
         return as_dict(info)
-
-    @property
-    def fault_active(self) -> bool:
-        """Whether any degradation is there at the scene's time."""
-        return any(has_set_in(fault, float(self.scene["t"])) for fault in self.faults)
 
     @property
     def traffic(self) -> np.ndarray:
@@ -265,20 +261,26 @@ class SharedControlEnv(AbstractEnv):
         return self.road.rows[1:]
 
     def show(
-        self, state: np.ndarray, traffic: np.ndarray, scene: np.ndarray, signals: np.ndarray, path: np.ndarray
+        self,
+        state: np.ndarray,
+        traffic: np.ndarray,
+        scene: np.ndarray,
+        signals: np.ndarray,
+        noted: np.ndarray,
+        path: np.ndarray,
     ) -> None:
         """Take over another environment's situation of the same settings, to draw it.
 
         Args:
             state: of the ego, shape (6,).
             traffic: of the other vehicles, shape (n, 8).
-            scene, signals: records.
+            scene, signals, noted: records.
             path: positions of the ego so far, shape (k + 1, 2).
         """
         self.vehicle.array[:] = state
         for vehicle, row in zip(self.road.vehicles[1:], traffic, strict=True):
             vehicle.array[:] = row
-        self.scene[()], self.signals[()] = scene, signals
+        self.scene[()], self.signals[()], self.noted[()] = scene, signals, noted
         self.steps = len(path) - 1
         self._path[: len(path)] = path
 

@@ -38,7 +38,10 @@ def checked_slot(slot: str, value: Any) -> np.ndarray:
             highway-env's ContinuousAction does.
     """
     low, high, size = _BOUNDS[slot]
-    array = np.array(value, dtype=np.float64)
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.full(0, np.nan)
     if array.shape != (size,) or not all(map(isfinite, array.tolist())):
         raise ValueError(
             f"action[{slot!r}] = {value!r} must be {size} finite number(s) in [{low:g}, {high:g}], shape ({size},)"

@@ -52,6 +52,9 @@ KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_vehicles_type")
 """Settings that all environments share."""
 
+AT_ONCE = 100_000
+"""Environment steps of a rollout between two looks at whether it is interrupted: less than a second of one core."""
+
 FEWEST_PER_THREAD = 32
 """Environments under which another thread costs more than it saves."""
 
@@ -115,10 +118,10 @@ class SharedControlVectorEnv(VectorEnv):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
     ) -> None:
-        if num_envs < 1:
-            raise ValueError(f"num_envs = {num_envs} must be at least 1")
-        if threads is not None and threads < 1:
-            raise ValueError(f"threads = {threads} must be at least 1, or None for one a core")
+        if not isinstance(num_envs, int | np.integer) or num_envs < 1:
+            raise ValueError(f"num_envs = {num_envs!r} must be an integer of at least 1")
+        if threads is not None and (not isinstance(threads, int | np.integer) or threads < 1):
+            raise ValueError(f"threads = {threads!r} must be an integer of at least 1, or None for one a core")
         for name, value in (("limiter", limiter), ("driver", driver)):
             if not isinstance(value, bool):
                 raise ValueError(
@@ -295,7 +298,7 @@ class SharedControlVectorEnv(VectorEnv):
             self._load_solvers()
         self._begin(mask, out)
         self._started = True
-        self._finish(out)
+        self._finish(out, mask)
         return out.observations, self._infos(out.infos, out.solver, mask)
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -316,7 +319,7 @@ class SharedControlVectorEnv(VectorEnv):
         checked = self._checked_actions(actions)
         out = self._outputs()
         _, finals = self._drive(checked, out)
-        self._finish(out)
+        self._finish(out, self._everyone)
         infos = self._infos(out.infos, out.solver, self._everyone.copy())
         if finals is not None:
             ended = finals.terminations | finals.truncations
@@ -327,8 +330,9 @@ class SharedControlVectorEnv(VectorEnv):
     def rollout(self, steps: int) -> Rollout:
         """Drive many time steps; both slots must be bound.
 
-        Where nothing is drawn or drawn anew, and nothing is to be seen, all of them are taken without returning to
-        Python in between. Where autoreset is disabled, an environment whose episode ends stands still from then on.
+        Where no episode is drawn, nothing is to be seen and no episode begins in the step that another ends in, many
+        of them are taken without returning to Python in between. Where autoreset is disabled, an environment whose
+        episode ends stands still from then on.
 
         Args:
             steps: how many, in every environment.
@@ -341,17 +345,20 @@ class SharedControlVectorEnv(VectorEnv):
         self._check_ready()
         if self._open:
             raise ValueError(f"rollout() needs limiter=True and driver=True; open are {list(self._open)}")
-        if steps < 1:
-            raise ValueError(f"steps = {steps} must be at least 1")
+        if not isinstance(steps, int | np.integer) or steps < 1:
+            raise ValueError(f"steps = {steps!r} must be an integer of at least 1")
         out = self._outputs()
-        if not self._random and self.render_mode is None and self._mode is not AutoresetMode.SAME_STEP:
-            result = self._advance(steps, self._everyone, self._nobody, self._no_actions, out)
-            self._finish(out)
-            return result
         taken = []
-        for _ in range(steps):
-            taken.append(self._drive(self._no_actions, out)[0])
-            self._finish(out)
+        if self._random or self.render_mode is not None or self._mode is AutoresetMode.SAME_STEP:
+            for _ in range(steps):
+                taken.append(self._drive(self._no_actions, out)[0])
+                self._finish(out, self._everyone)
+        else:
+            piece = max(1, AT_ONCE // self.num_envs)
+            for first in range(0, steps, piece):
+                n = min(piece, steps - first)
+                taken.append(self._advance(n, self._everyone, self._nobody, self._no_actions, out))
+            self._finish(out, self._everyone)
         return Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
@@ -367,7 +374,8 @@ class SharedControlVectorEnv(VectorEnv):
             self._viewer_env.reset(options={"config": plain(self._shown)})
         batch = self._batch
         k = int(batch.scenes[0]["k"])
-        self._viewer_env.show(batch.states[0], batch.traffic[0], batch.scenes[0], batch.signals[0], self._path[: k + 1])
+        path = self._path[: k + 1]
+        self._viewer_env.show(batch.states[0], batch.traffic[0], batch.scenes[0], batch.signals[0], self._noted, path)
         frame = self._viewer_env.render()
         return None if frame is None else (frame,)
 
@@ -513,10 +521,11 @@ class SharedControlVectorEnv(VectorEnv):
             solver=np.zeros(n, SOLVER),
         )
 
-    def _finish(self, out: Outputs) -> None:
-        """Keep what a later reset or picture needs."""
+    def _finish(self, out: Outputs, mask: np.ndarray) -> None:
+        """Keep what a later reset or picture needs, once the environments that the mask names have moved."""
         self._observations = out.observations.copy()
-        if self.render_mode is not None:
+        if self.render_mode is not None and mask[0]:
+            self._noted = out.infos[0].copy()
             self._path[self._batch.scenes[0]["k"]] = self._batch.states[0, :2]
             if self.render_mode == "human":
                 self.render()

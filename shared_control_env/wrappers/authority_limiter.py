@@ -25,14 +25,16 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
         allocator: another :class:`Allocator` to decide in the fuzzy inference's place.
 
     Raises:
-        ValueError: if the allocator lacks ``reset`` or ``allocate``.
+        ValueError: if the allocator is no object with ``reset`` and ``allocate``.
     """
 
     def __init__(self, env: gym.Env, allocator: Allocator | None = None) -> None:
         RecordConstructorArgs.__init__(self, allocator=allocator)
         SlotWrapper.__init__(self, env, AUTHORITY)
-        if allocator is not None and not isinstance(allocator, Allocator):
-            raise ValueError(f"allocator = {allocator!r} must have reset(seed) and allocate(scene, signals) -> alpha_a")
+        if allocator is not None and (isinstance(allocator, type) or not isinstance(allocator, Allocator)):
+            raise ValueError(
+                f"allocator = {allocator!r} must be an object with reset(seed) and allocate(scene, signals) -> alpha_a"
+            )
         self.allocator = allocator
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:

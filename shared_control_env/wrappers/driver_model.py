@@ -25,14 +25,16 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         driver: the driver; by default the paper's predictive driver with the environment's parameters.
 
     Raises:
-        ValueError: if the driver lacks ``reset`` or ``act``.
+        ValueError: if the driver is no object with ``reset`` and ``act``; at a step, if it gives no two finite numbers.
     """
 
     def __init__(self, env: gym.Env, driver: Driver | None = None) -> None:
         RecordConstructorArgs.__init__(self, driver=driver)
         SlotWrapper.__init__(self, env, DRIVER)
-        if driver is not None and not isinstance(driver, Driver):
-            raise ValueError(f"driver = {driver!r} must have reset(seed) and act(observation, scene) -> [a, delta]")
+        if driver is not None and (isinstance(driver, type) or not isinstance(driver, Driver)):
+            raise ValueError(
+                f"driver = {driver!r} must be an object with reset(seed) and act(observation, scene) -> [a, delta]"
+            )
         self._given = driver
         self.driver: Driver = driver or PredictiveDriver(parameters_of(self.shared.episode))
 
@@ -53,8 +55,8 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
     def decide(self) -> np.ndarray:
         """The driver's command over its limits, shape (2,)."""
         command = np.asarray(self.driver.act(self.shared.observation, self.shared.scene), dtype=float)
-        if command.shape != (2,):
-            raise ValueError(f"driver.act() gave {command!r}; it must give [a, delta] [m/s^2, rad], shape (2,)")
+        if command.shape != (2,) or not np.isfinite(command).all():
+            raise ValueError(f"driver.act() gave {command!r}; it must give finite [a, delta] [m/s^2, rad], shape (2,)")
         return command / self.shared.command_limits
 
     def _report(self) -> dict[str, Any]:

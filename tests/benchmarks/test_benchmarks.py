@@ -27,9 +27,12 @@ def test_every_part_runs():
 
 def test_parts_and_vectors_run():
     assert all(timing.median > 0.0 for timing in parts.times(1).values())
-    few = vectors.kernel(64, True, 1)
-    assert few.one.median > 0.0
-    assert (few.all, few.ratio) == (None, 1.0)
+    one = vectors.kernel(1, True, 1)
+    assert one.one.median > 0.0
+    assert (one.all, one.ratio) == (None, 1.0)
+    several = vectors.kernel(64, False, 1, "SharedControl/DenseTraffic-v0")
+    assert (several.all is not None) == (len(vectors.cores()) > 1)
+    assert several.ratio > 0.0
     allowed = vectors.cores()
     many = vectors.kernel(1024, False, 1)
     assert vectors.cores() == allowed

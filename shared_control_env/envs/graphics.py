@@ -122,11 +122,11 @@ class SharedControlViewer(EnvViewer):
         ):
             self._bar(name, float(noted[key]), (14, top + 42 + 36 * i), 0.32 * width, colour, False)
         limits = env.parameters["limits"]
-        for channel, (title, unit, bound, shown) in enumerate(
+        for channel, (title, text, bound) in enumerate(
             (
-                ("acceleration", "m/s2", float(limits["a_max"]), 1.0),
+                ("acceleration", _acceleration, float(limits["a_max"])),
                 # A bar to the left is steering to the left, which is positive.
-                ("steering", "deg to the left", -float(limits["delta_max"]), 180.0 / np.pi),
+                ("steering", _steering, -float(limits["delta_max"])),
             )
         ):
             left = (0.37 + 0.32 * channel) * width
@@ -139,8 +139,14 @@ class SharedControlViewer(EnvViewer):
                 )
             ):
                 value = float(noted[key][channel])
-                label = f"{title}, {name}: {round(value * shown, 2) + 0.0:+.2f} {unit}"
-                self._bar(label, value / bound, (left, top + 42 + 36 * i), 0.3 * width, colour, True)
+                self._bar(
+                    f"{title}, {name}: {text(value)}",
+                    value / bound,
+                    (left, top + 42 + 36 * i),
+                    0.3 * width,
+                    colour,
+                    True,
+                )
 
     def _bar(
         self,
@@ -166,6 +172,16 @@ class SharedControlViewer(EnvViewer):
 
     def _write(self, text: str, corner: tuple[float, float]) -> None:
         self.frame_surface.blit(self.font.render(text, True, INK), corner)
+
+
+def _acceleration(value: float) -> str:
+    return f"{round(value, 2) + 0.0:+.2f} m/s2"
+
+
+def _steering(value: float) -> str:
+    degrees = round(np.degrees(value), 2)
+    side = "left" if degrees > 0.0 else "right" if degrees < 0.0 else ""
+    return f"{abs(degrees):.2f} deg {side}"
 
 
 def _curved(chain: np.ndarray, spacing: float = 2.0) -> np.ndarray:

@@ -126,7 +126,7 @@ def search_triangles(
     triangles, or the shortest way. The fewest depends on which diagonal a rectangle happens to get,
     so the shortest way through the midpoints of the shared edges is taken (Dijkstra). A way narrower
     than the vehicle is none. Without a way to the front line the outcome is BLOCKED, and the area is
-    the union of all triangles that can be entered.
+    the union of all triangles that can be entered; where corners lie on a circle these depend on the diagonals.
 
     Args:
         triangles: shape (m, 3, 2), in any order and orientation.

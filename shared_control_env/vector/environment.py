@@ -276,6 +276,8 @@ class SharedControlVectorEnv(VectorEnv):
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_open()
+        if options is not None and not isinstance(options, dict):
+            raise ValueError(f"options = {options!r} must be a dict")
         options = dict(options or {})
         mask = self._checked_mask(options.pop("reset_mask", None))
         config = options.pop("config", None)
@@ -410,10 +412,10 @@ class SharedControlVectorEnv(VectorEnv):
             settings = configuration.check(configuration.merge(base, config))
             _check_for_kernel(settings)
             return settings, [settings] * self.num_envs
-        if len(config) != self.num_envs:
+        if not isinstance(config, list | tuple) or len(config) != self.num_envs:
+            n = self.num_envs
             raise ValueError(
-                f"options['config'] has {len(config)} entries; it must be a dict or have one for each of "
-                f"{self.num_envs} environments"
+                f"options['config'] = {config!r} must be a dict, or a list of one for each of {n} environments"
             )
         different = {id(entry): entry for entry in config}
         checked = {key: configuration.check(configuration.merge(base, entry)) for key, entry in different.items()}

@@ -45,7 +45,7 @@ def test_settings_of_each():
     infos = env.reset(options={"config": [{"ego": {"speed": speed}} for speed in (9.0, 10.0, 11.0)]})[1]
     np.testing.assert_array_equal(infos["state"][:, 3], [9.0, 10.0, 11.0])
     assert np.isfinite(env.step(np.zeros((3, 2)))[0]).all()
-    with pytest.raises(ValueError, match="2 entries"):
+    with pytest.raises(ValueError, match="one for each of 3"):
         env.reset(options={"config": [{}, {}]})
     with pytest.raises(ValueError, match=r"\[1\]\['duration'\]"):
         env.reset(options={"config": [{}, {"duration": 1.0}, {}]})
@@ -168,13 +168,18 @@ def test_episodes_of_different_lengths_follow_gymnasiums_own(mode):
     assert any(sum(ended) < 3 for _, *ended in ends)
 
 
-def test_a_reset_clears_the_drivers_report():
-    env = gym.make_vec(TWO_LANE, num_envs=2, driver=True, config={"duration": 0.5})
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+def test_a_reset_clears_the_drivers_report(mode):
+    env = gym.make_vec(TWO_LANE, num_envs=2, driver=True, config={"duration": 0.5}, autoreset_mode=mode)
     env.reset(seed=0)
-    for _ in range(10):
+    for _ in range(9):
         infos = env.step(None)[4]
-    assert (infos["driver"]["iterations"] > 0).all()
-    infos = env.step(None)[4]  # the next step begins anew
+        assert (infos["driver"]["iterations"] > 0).all()
+    infos = env.step(None)[4]
+    if mode == "next_step":
+        infos = env.step(None)[4]  # which begins anew
+    else:
+        assert (infos["final_info"]["driver"]["iterations"] > 0).all()
     np.testing.assert_array_equal(infos["k"], 0)
     np.testing.assert_array_equal(infos["driver"]["iterations"], 0)
 

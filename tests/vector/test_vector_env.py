@@ -345,6 +345,8 @@ def test_a_bad_action_names_its_environment_and_moves_nothing(bad):
         (lambda env: env.reset(seed=[1, 2]), "seed has 2 entries"),
         (lambda env: env.reset(seed=[1, 2.5, 3]), "seed of environment 1 is 2.5"),
         (lambda env: env.reset(seed=[1, 2, -3]), "seed of environment 2 is -3"),
+        (lambda env: env.reset(options=[1]), "must be a dict"),
+        (lambda env: env.reset(options={"config": 3}), "must be a dict, or a list"),
         (lambda env: env.reset(options={"maks": 1}), "unknown key"),
         (lambda env: env.reset(options={"reset_mask": [True] * 3}), "bool array"),
         (lambda env: env.reset(options={"reset_mask": np.zeros(3, dtype=bool)}), "names no environment"),

@@ -28,6 +28,7 @@ from agents.train import BEST, PROGRESS, Training
 from agents.views import DEAD_ZONE
 from experiments import style
 from shared_control_env.evaluation import SUITES
+from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
 
@@ -60,10 +61,13 @@ def state_of(task: str, seed: int) -> dict[str, Any]:
 
 
 def train(task: str, seed: int, steps: int) -> None:
-    """Train one policy to the end."""
+    """Train one policy to the end, in a process that an interrupt ends: it would go on to the next training."""
     training = Training(folder_of(task, seed), "ppo", IDS, task, seed)
-    while training.state["steps"] < steps:
-        training.run_segment(lambda _: None)
+    try:
+        while training.state["steps"] < steps:
+            training.run_segment(lambda _: None)
+    except KeyboardInterrupt:
+        os._exit(130)
 
 
 def train_all(jobs: int, console: Console) -> None:
@@ -73,14 +77,11 @@ def train_all(jobs: int, console: Console) -> None:
     with Progress(*columns, console=console) as bar, ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
         progress = bar.add_task("steps", total=sum(STEPS[task] for task, _ in runs))
         waiting = {pool.submit(train, task, seed, STEPS[task]) for task, seed in runs}
-        try:
-            while waiting:
-                done, waiting = wait(waiting, timeout=2.0)
-                for future in done:
-                    future.result()
-                bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
-        finally:
-            pool.shutdown(cancel_futures=True)  # an interrupt ends what is running; nothing else is to begin
+        while waiting:
+            done, waiting = wait(waiting, timeout=2.0)
+            for future in done:
+                future.result()
+            bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
 
 
 def draw_curves(path: Path) -> None:
@@ -186,12 +187,9 @@ def main(
 ) -> None:
     """Train, compare, and replace what ships; stopped, it goes on where it was."""
     console = Console()
-    try:
+    with resumable(FOLDER):
         train_all(jobs, console)
         publish(seeds, jobs, console)
-    except KeyboardInterrupt:
-        console.print(f"Stopped; what was trained until then is kept in {FOLDER}. The same command goes on.")
-        raise typer.Exit(130) from None
 
 
 if __name__ == "__main__":

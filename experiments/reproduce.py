@@ -28,6 +28,7 @@ from experiments import (
     video,
 )
 from experiments.case_runs import CASES, SEED, Run, all_runs, simulate
+from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.storage import write_atomically
 
 ROOT = Path(__file__).parent.parent
@@ -111,7 +112,7 @@ def main(
     console = Console()
     prepare(out, fresh)
     columns = (TextColumn("{task.description:<34}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
+    with resumable(out), Progress(*columns, console=console) as progress:
         planned = all_runs()
         task = progress.add_task("closed-loop runs", total=len(planned))
         runs = {}

@@ -25,6 +25,7 @@ from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose
 from shared_control_env.evaluation.episodes import AS_GIVEN
+from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
 
@@ -68,7 +69,7 @@ def benchmark(
 
     console = Console()
     columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar:
+    with resumable(out), Progress(*columns, console=console) as bar:
         task = bar.add_task("episodes", total=None)
         try:
             table = evaluate(
@@ -88,10 +89,6 @@ def benchmark(
             bar.stop()
             console.print(f"[red]{error}[/]: what could be written until then is in {out}; start again to go on.")
             raise typer.Exit(1) from None
-        except KeyboardInterrupt:
-            bar.stop()
-            console.print(f"Stopped; what was done until then is kept in {out}. The same command goes on.")
-            raise typer.Exit(130) from None
     console.print(summary(table))
     console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.")
 

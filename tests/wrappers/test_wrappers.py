@@ -4,6 +4,7 @@ import pytest
 from gymnasium import spaces
 
 import shared_control_env  # noqa: F401
+from shared_control_env.controllers.allocators import FixedAuthority
 from shared_control_env.core.fuzzy import authority
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel, open_slots
@@ -92,7 +93,9 @@ def test_drivers_seed_comes_from_the_environments_generator():
     [
         (lambda: AuthorityLimiter(AuthorityLimiter(TwoLaneEnv())), "bound already"),
         (lambda: DriverModel(DriverModel(TwoLaneEnv())), "bound already"),
-        (lambda: DriverModel(TwoLaneEnv(), driver=object()), "must have reset"),
+        (lambda: DriverModel(TwoLaneEnv(), driver=object()), "must be an object with reset"),
+        (lambda: DriverModel(TwoLaneEnv(), driver=Steady), "must be an object with reset"),
+        (lambda: AuthorityLimiter(TwoLaneEnv(), allocator=FixedAuthority), "must be an object with reset"),
         (lambda: AuthorityLimiter(gym.make("CartPole-v1")), "SharedControlEnv"),
     ],
 )
@@ -106,6 +109,6 @@ def test_a_drivers_malformed_command_moves_nothing(command):
     env = DriverModel(gym.make("SharedControl/TwoLane-v0"), Steady(command))
     env.reset(seed=0)
     state = env.unwrapped.vehicle.array.copy()
-    with pytest.raises(ValueError, match="driver"):
+    with pytest.raises(ValueError, match=r"driver\.act\(\) gave"):
         env.step(0)
     np.testing.assert_array_equal(env.unwrapped.vehicle.array, state)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,21 +16,17 @@ from gymnasium.vector.utils import batch_space
 from shared_control_env.core.delaunay import MAX_HOLES
 from shared_control_env.core.info import INFO
 from shared_control_env.core.observation import FEATURES
-from shared_control_env.core.parameters import DegradationParameters, Parameters, TrafficParameters
 from shared_control_env.core.records import (
     AUTOMATION_MEMORY,
     FAULT_MEMORY,
     MEMORY,
     SCENE,
     SIGNALS,
-    record_dtype,
 )
-from shared_control_env.core.road import S0
 from shared_control_env.envs import config as configuration
 from shared_control_env.envs.cases import CASES, Case
 from shared_control_env.envs.config import Settings, plain
 from shared_control_env.envs.episode import draw_episode, is_random
-from shared_control_env.envs.situation import start_of
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, space_of
 from shared_control_env.vector import cold_start, kernel
 from shared_control_env.vector.records import (
@@ -43,8 +37,9 @@ from shared_control_env.vector.records import (
     Batch,
     Outputs,
     Setup,
-    Starts,
 )
+from shared_control_env.vector.starts import empty_starts, sizes_for, write_start
+from shared_control_env.vector.threads import Threads
 
 KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 """Traffic that the kernel knows."""
@@ -143,11 +138,10 @@ class SharedControlVectorEnv(VectorEnv):
         _check_for_kernel(settings)
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
-        wanted = threads or cold_start.cores()
-        self.threads = max(1, min(wanted, num_envs // FEWEST_PER_THREAD)) if threads is None else min(wanted, num_envs)
-        self._open_pool()
-        self._works = np.zeros(self.threads, WORKSPACE)
-        self._programs = np.zeros(self.threads, PROGRAM)
+        few = max(1, num_envs // FEWEST_PER_THREAD)
+        self._threads = Threads(min(threads, num_envs) if threads is not None else min(cold_start.cores(), few))
+        self._works = np.zeros(self._threads.count, WORKSPACE)
+        self._programs = np.zeros(self._threads.count, PROGRAM)
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
         self._seeds: list[int | None] = [None] * num_envs
@@ -165,11 +159,6 @@ class SharedControlVectorEnv(VectorEnv):
         self.action_space = batch_space(single, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
-    def _open_pool(self) -> None:
-        """Start the threads beside the main one."""
-        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
-        self._process = os.getpid()
-
     def _adopt(self, settings: Settings, templates: list[Settings]) -> None:
         """Take on settings, all and those of each environment; nothing has begun then."""
         n = self.num_envs
@@ -180,10 +169,10 @@ class SharedControlVectorEnv(VectorEnv):
         self._path = np.zeros((settings.steps + 1, 2))
         self._random = any(template is not settings or is_random(template) for template in templates)
         self._episodes = [settings] * n
-        faults, rows, vehicles = _most(templates)
-        starts = _starts(0 if self._random else 1, faults, rows, vehicles)
+        sizes = sizes_for(templates)
+        starts = empty_starts(0 if self._random else 1, sizes)
         if not self._random:
-            _write_start(settings, starts, 0)
+            write_start(settings, starts, 0)
         self._setup = Setup(
             starts=starts,
             steps=settings.steps,
@@ -195,27 +184,31 @@ class SharedControlVectorEnv(VectorEnv):
             solvers=self._solvers,
         )
         self._batch = Batch(
-            **_starts(n, faults, rows, vehicles)._asdict(),
+            **empty_starts(n, sizes)._asdict(),
             scenes=np.zeros(n, SCENE),
             signals=np.zeros(n, SIGNALS),
             memories=np.zeros(n, MEMORY),
             automations=np.zeros(n, AUTOMATION_MEMORY),
-            fault_memories=np.zeros((n, faults), FAULT_MEMORY),
+            fault_memories=np.zeros((n, sizes.faults), FAULT_MEMORY),
             crashed=np.zeros(n, dtype=bool),
             ended=np.zeros(n, dtype=bool),
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what belongs to this process: threads, viewer, and where the solvers are in its memory."""
+        """All but what belongs to this process: the viewer, and where the solvers are in its memory."""
         setup = self._setup._replace(solvers=NOT_LOADED)
-        return {**self.__dict__, "_pool": None, "_viewer_env": None, "_solvers": NOT_LOADED, "_setup": setup}
+        return {**self.__dict__, "_viewer_env": None, "_solvers": NOT_LOADED, "_setup": setup}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Go on where the pickled or copied one was."""
         self.__dict__.update(state)
-        self._open_pool()
         if self._started:
             self._load_solvers()
+
+    @property
+    def threads(self) -> int:
+        """How many threads there are."""
+        return self._threads.count
 
     @property
     def config(self) -> dict[str, Any]:
@@ -384,8 +377,7 @@ class SharedControlVectorEnv(VectorEnv):
     def close_extras(self, **kwargs: Any) -> None:
         """Close the viewer and end the threads."""
         self._close_viewer()
-        if self._pool is not None:
-            self._pool.shutdown()
+        self._threads.close()
 
     def _close_viewer(self) -> None:
         if self._viewer_env is not None:
@@ -456,7 +448,7 @@ class SharedControlVectorEnv(VectorEnv):
             drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
             for i, episode in drawn.items():
                 self._episodes[i] = episode
-                _write_start(episode, self._batch, i)
+                write_start(episode, self._batch, i)
 
     def _drive(self, actions: Actions, out: Outputs) -> tuple[Rollout, Outputs | None]:
         """One step of all environments; also what episodes ended with that began anew in the same step, if any."""
@@ -478,7 +470,7 @@ class SharedControlVectorEnv(VectorEnv):
         """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
         rewards = np.zeros((steps, self.num_envs))
         ends = np.zeros((steps, self.num_envs), dtype=bool)
-        taken = np.zeros(self.threads, dtype=np.int64)
+        taken = np.zeros(self._threads.count, dtype=np.int64)
 
         def work(thread: int) -> None:
             kernel.advance(
@@ -498,17 +490,7 @@ class SharedControlVectorEnv(VectorEnv):
                 thread,
             )
 
-        if self._process != os.getpid():  # threads do not live on in a forked process
-            self._open_pool()
-        others: list[Future[None]] = []
-        try:
-            if self._pool is not None:
-                others.extend(self._pool.submit(work, thread) for thread in range(1, self.threads))
-            work(0)
-        finally:
-            _await_all(others)
-        for other in others:
-            other.result()  # raises what it raised
+        self._threads.run(work)
         return Rollout(rewards, ends)
 
     def _outputs(self) -> Outputs:
@@ -601,18 +583,6 @@ def _check_for_kernel(settings: Settings) -> None:
         raise ValueError(f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}")
 
 
-def _await_all(futures: Sequence[Future[None]]) -> None:
-    """Wait until all are done, interrupts notwithstanding: threads left running would race with the next step."""
-    interrupt: KeyboardInterrupt | None = None
-    while not all(future.done() for future in futures):
-        try:
-            wait(futures)
-        except KeyboardInterrupt as error:
-            interrupt = error
-    if interrupt is not None:
-        raise interrupt
-
-
 def _numbers(value: Any) -> np.ndarray | None:
     """A new array of real numbers, None where the value is something else."""
     try:
@@ -630,47 +600,6 @@ def _batched(records: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
         values[name] = _batched(field, mask) if field.dtype.names else field
         values[f"_{name}"] = mask
     return values
-
-
-def _most(templates: Sequence[Settings]) -> tuple[int, int, int]:
-    """Most faults, rows of the reference line and vehicles that any of the settings draws."""
-    different = list({id(template): template for template in templates}.values())
-    faults = max(len(template.faults) + (1 if template.degradations else 0) for template in different)
-    return faults, max(_most_rows(template) for template in different), len(different[0].vehicles)
-
-
-def _starts(n: int, faults: int, rows: int, vehicles: int) -> Starts:
-    """Arrays for n starts."""
-    return Starts(
-        parameters=np.zeros(n, record_dtype(Parameters)),
-        states=np.zeros((n, 6)),
-        lines=np.zeros((n, rows, 6)),
-        faults=np.zeros((n, faults), record_dtype(DegradationParameters)),
-        traffic=np.zeros((n, vehicles, 8)),
-        plans=np.zeros((n, vehicles), record_dtype(TrafficParameters)),
-    )
-
-
-def _most_rows(settings: Settings) -> int:
-    """Rows of the reference line: one for the lead-in and one for every segment, more where arcs are long.
-
-    The whole road turns by at most 2 pi, in pieces of up to pi / 2.
-    """
-    if any(entry.setting.startswith("road") for entry in settings.randomise):
-        return 1 + len(settings.road.segments) + 4
-    return len(start_of(settings).line)
-
-
-def _write_start(settings: Settings, starts: Starts | Batch, i: int) -> None:
-    """Write an episode's start as entry i; what is left of a line begins at infinity, of the faults is none."""
-    start = start_of(settings)
-    starts.parameters[i], starts.states[i] = start.parameters[()], start.ego
-    starts.lines[i] = 0.0
-    starts.lines[i, :, S0] = np.inf
-    starts.lines[i, : len(start.line)] = start.line
-    starts.faults[i] = np.zeros((), starts.faults.dtype)
-    starts.faults[i, : len(start.faults)] = start.faults
-    starts.traffic[i], starts.plans[i] = start.traffic, start.plans
 
 
 class Vectorised:

@@ -386,7 +386,9 @@ class SharedControlVectorEnv(VectorEnv):
 
     def _check_open(self) -> None:
         if self.closed:
-            raise ClosedEnvironmentError("the environments are closed; make new ones")
+            raise ClosedEnvironmentError(
+                "the environments are closed, by close() or with a wrapper around them that is gone; make new ones"
+            )
 
     def _check_ready(self) -> None:
         """Raise what keeps the environments from being driven on."""

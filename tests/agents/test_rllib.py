@@ -85,9 +85,10 @@ def test_episodes_that_end_begin_a_new_history():
 def test_runners_have_episodes_of_their_own_below_those_of_validation():
     size = HISTORY * len(DRIVER_FEATURES)
     env = rllib.make_environment(ID, "driver", rllib.Normalisation(np.zeros(size), np.ones(size)), 8)
+    env = rllib.TrainingSeeds(env)  # kept, since Gymnasium closes an environment when a wrapper around it is gone
     seeds = []
     for seed in (0, 1, HELD_OUT_SEED):
-        rllib.TrainingSeeds(env).reset(seed=seed)
+        env.reset(seed=seed)
         seeds += env.unwrapped.np_random_seed
     assert len(set(seeds)) == 24
     assert max(seeds) < VALIDATION_SEED

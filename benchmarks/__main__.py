@@ -48,6 +48,8 @@ def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timi
     spread = f"{seconds.median:.0f} s ({seconds.low:.0f} to {seconds.high:.0f})"
     report("10,000 episodes of 10 s of the full suite, all cores", spread, "", "300 s")
     report("vector env, import to first step, cold", f"{startup.vector_start(cold=True):.1f} s", "", "30 s")
+    with_driver = startup.vector_start(cold=True, driver=True)
+    report("vector env with the driver, import to first step, cold", f"{with_driver:.1f} s", "", "30 s")
     report("vector env, import to first step, warm", f"{startup.vector_start(cold=False):.2f} s", "", "2 s")
 
     packages = ", ".join(f"{name} {version(name)}" for name in ("highway-env", "gymnasium", "numpy", "numba", "osqp"))

@@ -23,28 +23,30 @@ print(perf_counter() - imported, perf_counter() - begin)
 
 
 VECTOR_CODE = """
+import sys
 from time import perf_counter
 begin = perf_counter()
 import gymnasium as gym, numpy as np
 import shared_control_env
-env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=64, threads=1)
+env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=64, threads=1, driver=sys.argv[1] == "driver")
 env.reset(seed=0)
 env.step(np.zeros((64, 2)))
 print(perf_counter() - begin)
 """
 
 
-def vector_start(cold: bool) -> float:
+def vector_start(cold: bool, driver: bool = False) -> float:
     """Seconds from the import to the end of the kernel's first step, in a new process.
 
     Args:
         cold: with an empty numba cache, in a folder of its own.
+        driver: with the predictive driver bound.
     """
     environment = dict(os.environ)
     with tempfile.TemporaryDirectory() as folder:
         if cold:
             environment["NUMBA_CACHE_DIR"] = folder
-        command = [sys.executable, "-c", VECTOR_CODE]
+        command = [sys.executable, "-c", VECTOR_CODE, "driver" if driver else "random"]
         result = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
     return float(result.stdout)
 

@@ -34,6 +34,7 @@ from agents.policy import Policy
 from agents.tasks import TASKS, VALIDATION_SEED
 from agents.vec_envs import Timed, make_environment
 from shared_control_env.evaluation.catalogue import choose
+from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
 
@@ -220,13 +221,11 @@ def main(
         choose("algo", algo, ALGORITHMS)
         choose("task", task, TASKS)
         choose("env", ids, ENVIRONMENTS)
-        training = Training(folder, algo, ids, task, seed)
-        run(training, steps, console)
+        with resumable(folder):
+            training = Training(folder, algo, ids, task, seed)
+            run(training, steps, console)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    except KeyboardInterrupt:
-        console.print(f"Stopped; {training.state['steps']:,} steps are kept in {folder}. The same command goes on.")
-        raise typer.Exit(130) from None
     share = training.state["in_environment"] / training.state["seconds"]
     console.print(
         f"{training.state['steps']:,} steps in {training.state['seconds']:.0f} s, {100.0 * share:.0f} % of it in the "

@@ -10,7 +10,7 @@ import json
 import os
 import shutil
 from concurrent.futures import ProcessPoolExecutor, wait
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -61,13 +61,10 @@ def state_of(task: str, seed: int) -> dict[str, Any]:
 
 
 def train(task: str, seed: int, steps: int) -> None:
-    """Train one policy to the end, in a process that an interrupt ends: it would go on to the next training."""
+    """Train one policy to the end."""
     training = Training(folder_of(task, seed), "ppo", IDS, task, seed)
-    try:
-        while training.state["steps"] < steps:
-            training.run_segment(lambda _: None)
-    except KeyboardInterrupt:
-        os._exit(130)
+    while training.state["steps"] < steps:
+        training.run_segment(lambda _: None)
 
 
 def train_all(jobs: int, console: Console) -> None:
@@ -77,11 +74,16 @@ def train_all(jobs: int, console: Console) -> None:
     with Progress(*columns, console=console) as bar, ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
         progress = bar.add_task("steps", total=sum(STEPS[task] for task, _ in runs))
         waiting = {pool.submit(train, task, seed, STEPS[task]) for task, seed in runs}
-        while waiting:
-            done, waiting = wait(waiting, timeout=2.0)
-            for future in done:
-                future.result()
-            bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
+        try:
+            while waiting:
+                done, waiting = wait(waiting, timeout=2.0)
+                for future in done:
+                    future.result()
+                bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
+        except KeyboardInterrupt:
+            for process in active_children():  # which would go on to the next training
+                process.terminate()
+            raise
 
 
 def draw_curves(path: Path) -> None:

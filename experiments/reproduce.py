@@ -61,12 +61,12 @@ def prepare(out: Path, fresh: bool) -> None:
     if out.exists() and any(out.iterdir()):
         if not stamp.is_file():
             raise typer.BadParameter(f"{out} holds files that are no results of this command; choose another --out")
-        if fresh:
+        if stamp.read_text().strip() != fingerprint():
+            if not fresh:
+                raise typer.BadParameter(
+                    f"{out} holds results of other sources or versions; pass --fresh to replace them, or another --out"
+                )
             shutil.rmtree(out)
-        elif stamp.read_text().strip() != fingerprint():
-            raise typer.BadParameter(
-                f"{out} holds results of other sources or versions; pass --fresh to replace them, or another --out"
-            )
     out.mkdir(parents=True, exist_ok=True)
     stamp.write_text(fingerprint() + "\n")
 

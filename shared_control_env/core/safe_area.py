@@ -13,8 +13,8 @@ from math import hypot
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 
+from shared_control_env.core import delaunay
 from shared_control_env.core.jit import jit, jit_allocating, jit_inlined
 from shared_control_env.core.records import MAX_CHAIN, Record
 
@@ -82,11 +82,26 @@ def triangulate(start: float, end: float, low: float, high: float, holes: np.nda
     Returns:
         Triangles, shape (m, 3, 2); m = 0 when the holes cover the region.
     """
+    import shapely  # seldom needed, and slow to import
+
     region = shapely.box(start, low, end, high)
     if holes.shape[0]:
         region = region.difference(shapely.union_all(shapely.polygons(holes)))
     triangles = shapely.constrained_delaunay_triangles(region)
     return shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3].copy()
+
+
+@jit_inlined
+def triangulate_compiled(region: np.ndarray, holes: np.ndarray, count: int, work: Record) -> int:
+    """:func:`delaunay.triangulate`, with no triangles at all where that gives up, so that the area is blocked.
+
+    Args:
+        region, holes, count, work: as there.
+
+    Returns:
+        Number of triangles in ``work.triangles``.
+    """
+    return max(0, delaunay.triangulate(region, holes, count, work))
 
 
 @jit

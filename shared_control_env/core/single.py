@@ -11,7 +11,6 @@ import numpy as np
 from shared_control_env.core import (
     automation_mpc,
     closed_loop,
-    delaunay,
     driver_qp,
     dynamics,
     fuzzy,
@@ -58,7 +57,7 @@ def find_area(corners: np.ndarray, count: int, parameters: Record, scene: Record
     if safe_area.is_whole(count, s.region, parameters[()].vehicle.width):
         safe_area.whole_region(s.region, s.area)
     else:
-        n = max(0, delaunay.triangulate(s.region, corners, count, w))
+        n = safe_area.triangulate_compiled(s.region, corners, count, w)
         search(w.triangles[:n], parameters, scene)
 
 

@@ -103,7 +103,10 @@ class SharedControlViewer(EnvViewer):
         pygame.draw.polygon(self.sim_surface, INK, diamond, 1)
 
     def _draw_panel(self) -> None:
-        """Gauges of risk and authority on the left, of the commands on the right, all of the step that led here."""
+        """Gauges of risk and authority on the left, of the commands on the right.
+
+        They and the fault are of the step that led to the picture; time, speed and position are the picture's.
+        """
         env, noted = self.env, self.env.noted
         width, top = self.frame_surface.get_width(), self.frame_surface.get_height() - PANEL_HEIGHT
         pygame.draw.rect(self.frame_surface, BACKGROUND, (0, top, width, PANEL_HEIGHT))

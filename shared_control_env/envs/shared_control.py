@@ -122,7 +122,6 @@ class SharedControlEnv(AbstractEnv):
         Raises:
             ValueError: for unknown options or wrong settings.
         """
-        gym.Env.reset(self, seed=seed)
         if options is not None and not isinstance(options, dict):
             raise ValueError(f"options = {options!r} must be a dict")
         unknown = set(options or {}) - {"config"}
@@ -130,6 +129,7 @@ class SharedControlEnv(AbstractEnv):
             raise ValueError(f"options has the unknown key(s) {sorted(unknown)}; valid is 'config'")
         if options and "config" in options:
             self.configure(options["config"])
+        gym.Env.reset(self, seed=seed)
         self.update_metadata()
         self.steps, self.done = 0, False
         self._reset()

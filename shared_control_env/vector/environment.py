@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from gymnasium import spaces
+from gymnasium import logger, spaces
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.error import ClosedEnvironmentError
 from gymnasium.utils import seeding
@@ -113,9 +113,9 @@ class SharedControlVectorEnv(VectorEnv):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
     ) -> None:
-        if not isinstance(num_envs, int | np.integer) or num_envs < 1:
+        if not _is_integer(num_envs) or num_envs < 1:
             raise ValueError(f"num_envs = {num_envs!r} must be an integer of at least 1")
-        if threads is not None and (not isinstance(threads, int | np.integer) or threads < 1):
+        if threads is not None and (not _is_integer(threads) or threads < 1):
             raise ValueError(f"threads = {threads!r} must be an integer of at least 1, or None for one a core")
         for name, value in (("limiter", limiter), ("driver", driver)):
             if not isinstance(value, bool):
@@ -133,7 +133,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._limiter, self._driver = limiter, driver
         self._case = case
         self._viewer_env: Any = None
-        default = configuration.merge(configuration.plain(configuration.Settings()), case.settings)
+        default = configuration.merge(configuration.plain(Settings()), case.settings)
         settings = configuration.check(configuration.merge(default, config or {}))
         _check_for_kernel(settings)
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
@@ -212,7 +212,7 @@ class SharedControlVectorEnv(VectorEnv):
 
     @property
     def config(self) -> dict[str, Any]:
-        """The settings of every environment."""
+        """The settings of all environments, without what a list of :meth:`reset` changed in some."""
         return configuration.plain(self._settings)
 
     @property
@@ -264,8 +264,8 @@ class SharedControlVectorEnv(VectorEnv):
             Observations, and infos with masks as Gymnasium's.
 
         Raises:
-            ValueError: for unknown options, a wrong mask, wrong seeds or settings, all of which change nothing; also
-                if an episode cannot be drawn, before any environment is reset.
+            ValueError: for unknown options, a wrong mask, wrong seeds or settings, all of which change nothing. Also if
+                an episode cannot be drawn: no environment is reset then, but changed settings stay, and need a reset.
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_open()
@@ -293,7 +293,7 @@ class SharedControlVectorEnv(VectorEnv):
             self._load_solvers()
         self._begin(mask, out)
         self._started = True
-        self._finish(out, mask)
+        self._show()
         return out.observations, self._infos(out.infos, out.solver, mask)
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
@@ -307,14 +307,16 @@ class SharedControlVectorEnv(VectorEnv):
 
         Raises:
             ValueError: for a malformed action, naming the environment's index where one is to blame; nothing has
-                moved then. Also before the first reset, and for an ended environment where the mode does not reset it.
+                moved then. Also before the first reset, for an ended environment where the mode does not reset it, and
+                if an episode cannot be drawn: before anything moves, or in the mode ``same_step`` after that, when the
+                ended environments await a reset.
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_ready()
         checked = self._checked_actions(actions)
         out = self._outputs()
         _, finals = self._drive(checked, out)
-        self._finish(out, self._everyone)
+        self._show()
         infos = self._infos(out.infos, out.solver, self._everyone.copy())
         if finals is not None:
             ended = finals.terminations | finals.truncations
@@ -333,33 +335,41 @@ class SharedControlVectorEnv(VectorEnv):
             steps: how many, in every environment.
 
         Raises:
-            ValueError: if a slot of the action is open, steps is below 1, there was no reset, or an environment has
-                ended already and the mode does not reset it.
+            ValueError: if a slot of the action is open, steps is below 1, there was no reset, an environment has ended
+                already and the mode does not reset it, or, as for :meth:`step`, an episode cannot be drawn.
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_ready()
         if self._open:
             raise ValueError(f"rollout() needs limiter=True and driver=True; open are {list(self._open)}")
-        if not isinstance(steps, int | np.integer) or steps < 1:
+        if not _is_integer(steps) or steps < 1:
             raise ValueError(f"steps = {steps!r} must be an integer of at least 1")
         out = self._outputs()
         taken = []
         if self._random or self.render_mode is not None or self._mode is AutoresetMode.SAME_STEP:
             for _ in range(steps):
                 taken.append(self._drive(self._no_actions, out)[0])
-                self._finish(out, self._everyone)
+                self._show()
         else:
             piece = max(1, AT_ONCE // self.num_envs)
             for first in range(0, steps, piece):
                 n = min(piece, steps - first)
-                taken.append(self._advance(n, self._everyone, self._nobody, self._no_actions, out))
-            self._finish(out, self._everyone)
+                taken.append(self._move(n, self._everyone, self._nobody, self._no_actions, out))
         return Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Draw environment 0; in ``rgb_array`` mode a tuple of its frame."""
+        """Draw environment 0; in ``rgb_array`` mode a tuple of its frame.
+
+        Raises:
+            ValueError: before the first reset.
+            ClosedEnvironmentError: after :meth:`close`.
+        """
+        self._check_open()
         if not self._started:
             raise ValueError("render() needs a reset() first")
+        if self.render_mode is None:
+            logger.warn("render() draws nothing without a render_mode; pass one to gym.make_vec, such as 'rgb_array'")
+            return None
         if self._viewer_env is None:
             make: Any = load_env_creator("shared_control_env.envs.shared_control:SharedControlEnv")
             self._viewer_env = make(plain(self._episodes[0]), render_mode=self.render_mode)
@@ -373,6 +383,11 @@ class SharedControlVectorEnv(VectorEnv):
         self._viewer_env.show(batch.states[0], batch.traffic[0], batch.scenes[0], batch.signals[0], self._noted, path)
         frame = self._viewer_env.render()
         return None if frame is None else (frame,)
+
+    def _show(self) -> None:
+        """Draw what people look at all the time."""
+        if self.render_mode == "human":
+            self.render()
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the viewer and end the threads."""
@@ -400,27 +415,31 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"environment {index} has ended; reset it with options={{'reset_mask': ...}}")
 
     def _changed(self, config: dict[str, Any] | Sequence[dict[str, Any]]) -> tuple[Settings, list[Settings]]:
-        """Settings of all environments changed by a dict, or those of each by one entry of a list."""
-        base = configuration.plain(self._settings)
+        """Settings of all environments and of each, changed by a dict, or those of each by one entry of a list."""
         if isinstance(config, Mapping):
-            settings = configuration.check(configuration.merge(base, config))
-            _check_for_kernel(settings)
-            return settings, [settings] * self.num_envs
-        if not isinstance(config, list | tuple) or len(config) != self.num_envs:
+            settings, entries = _merged(self._settings, config), [config] * self.num_envs
+        elif isinstance(config, list | tuple) and len(config) == self.num_envs:
+            settings, entries = self._settings, list(config)
+        else:
             n = self.num_envs
             raise ValueError(
                 f"options['config'] = {config!r} must be a dict, or a list of one for each of {n} environments"
             )
-        different = {id(entry): entry for entry in config}
-        checked = {key: configuration.check(configuration.merge(base, entry)) for key, entry in different.items()}
-        templates = [checked[id(entry)] for entry in config]
+        _check_for_kernel(settings)
+        merged = {(id(self._settings), id(config)): settings}
+        templates = []
+        for template, entry in zip(self._templates, entries, strict=True):
+            key = id(template), id(entry)
+            if key not in merged:
+                merged[key] = _merged(template, entry)
+            templates.append(merged[key])
         for i, template in enumerate(templates):
             for name in ONE_FOR_ALL:
-                if getattr(template, name) != getattr(self._settings, name):
+                if getattr(template, name) != getattr(settings, name):
                     raise ValueError(f"options['config'][{i}][{name!r}] must be that of all environments")
-            if len(template.vehicles) != len(self._settings.vehicles):
+            if len(template.vehicles) != len(settings.vehicles):
                 raise ValueError(f"options['config'][{i}]['vehicles'] must have as many entries as in all")
-        return self._settings, templates
+        return settings, templates
 
     def _load_solvers(self) -> None:
         """Have all compiled that a step runs."""
@@ -442,21 +461,23 @@ class SharedControlVectorEnv(VectorEnv):
     def _begin(self, mask: np.ndarray, out: Outputs) -> None:
         """Begin an episode in each environment that the mask names."""
         self._draw(mask)
-        self._advance(1, mask, mask, self._no_actions, out)
+        self._move(1, mask, mask, self._no_actions, out)
 
     def _draw(self, mask: np.ndarray) -> None:
         """Draw an episode for each environment that the mask names, if anything is random; all of them, or none."""
+        drawn = {}
         if self._random:
             drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
-            for i, episode in drawn.items():
-                self._episodes[i] = episode
-                write_start(episode, self._batch, i)
+        self._batch.ended[mask] = True  # until they have begun: an interrupt may come between
+        for i, episode in drawn.items():
+            self._episodes[i] = episode
+            write_start(episode, self._batch, i)
 
     def _drive(self, actions: Actions, out: Outputs) -> tuple[Rollout, Outputs | None]:
         """One step of all environments; also what episodes ended with that began anew in the same step, if any."""
         if self._mode is AutoresetMode.NEXT_STEP:
             self._draw(self._batch.ended)
-        result = self._advance(1, self._everyone, self._nobody, actions, out)
+        result = self._move(1, self._everyone, self._nobody, actions, out)
         ended = result.ends[0]
         if self._mode is not AutoresetMode.SAME_STEP or not ended.any():
             return result, None
@@ -467,6 +488,16 @@ class SharedControlVectorEnv(VectorEnv):
         for name in ("rewards", "terminations", "truncations"):
             getattr(out, name)[ended] = getattr(finals, name)[ended]
         return result, finals
+
+    def _move(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
+        """Advance environments, and keep what a later reset or picture needs even if an interrupt comes then."""
+        try:
+            return self._advance(steps, active, resets, actions, out)
+        finally:
+            self._observations = out.observations.copy()
+            if self.render_mode is not None and active[0]:
+                self._noted = out.infos[0].copy()
+                self._path[self._batch.scenes[0]["k"]] = self._batch.states[0, :2]
 
     def _advance(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
         """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
@@ -506,15 +537,6 @@ class SharedControlVectorEnv(VectorEnv):
             infos=np.zeros(n, INFO),
             solver=np.zeros(n, SOLVER),
         )
-
-    def _finish(self, out: Outputs, mask: np.ndarray) -> None:
-        """Keep what a later reset or picture needs, once the environments that the mask names have moved."""
-        self._observations = out.observations.copy()
-        if self.render_mode is not None and mask[0]:
-            self._noted = out.infos[0].copy()
-            self._path[self._batch.scenes[0]["k"]] = self._batch.states[0, :2]
-            if self.render_mode == "human":
-                self.render()
 
     def _infos(self, infos: np.ndarray, solver: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
         """Records as Gymnasium's nested dict of arrays with their masks."""
@@ -563,15 +585,20 @@ class SharedControlVectorEnv(VectorEnv):
         """Generator and seed of each environment, None where none is given."""
         if seed is None:
             return [None] * self.num_envs
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else list(seed)
-        if len(seeds) != self.num_envs:
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else seed
+        if not isinstance(seeds, Sequence | np.ndarray) or len(seeds) != self.num_envs:
             raise ValueError(
-                f"seed has {len(seeds)} entries; it must be an int or have one for each of {self.num_envs}"
+                f"seed = {seed!r} must be an integer, or have one for each of {self.num_envs} environments"
             )
         for i, value in enumerate(seeds):
             if value is not None and (not isinstance(value, int | np.integer) or value < 0):
                 raise ValueError(f"seed of environment {i} is {value!r}; it must be an integer from 0 on, or None")
         return [None if value is None else seeding.np_random(int(value)) for value in seeds]
+
+
+def _merged(settings: Settings, changes: Mapping[str, Any]) -> Settings:
+    """Settings with some changes, checked."""
+    return configuration.check(configuration.merge(configuration.plain(settings), changes))
 
 
 def _check_for_kernel(settings: Settings) -> None:
@@ -583,6 +610,10 @@ def _check_for_kernel(settings: Settings) -> None:
         )
     if len(settings.vehicles) > MAX_HOLES:
         raise ValueError(f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}")
+
+
+def _is_integer(value: Any) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def _numbers(value: Any) -> np.ndarray | None:

@@ -132,7 +132,7 @@ SOLVER = np.dtype(
 )
 """Report of the driver's solver, as ``info["driver"]``."""
 
-SEARCH = np.dtype(
+SEARCH_SCRATCH = np.dtype(
     [
         ("neighbours", np.int64, (MAX_TRIANGLES, 3)),
         ("distance", np.float64, (MAX_TRIANGLES,)),
@@ -152,7 +152,7 @@ WORKSPACE = np.dtype(
     [
         ("solver", condensing.WORKSPACE),
         ("triangles", delaunay.WORKSPACE),
-        ("search", SEARCH),
+        ("search", SEARCH_SCRATCH),
         ("corners", np.float64, (delaunay.MAX_HOLES, 4, 2)),  # vehicles in the driving region
         ("row", np.float64, (8,)),  # the ego as a row of traffic
         ("plant", np.float64, (2, 6)),

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numba import cfunc, float64, from_dtype, int64, types
 
-from shared_control_env.core import active_set_qp, closed_loop, condensing, delaunay
+from shared_control_env.core import active_set_qp, closed_loop, condensing
 from shared_control_env.core.driver_qp import build_program
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, Record, record_dtype
-from shared_control_env.core.safe_area import Scratch, search_triangles
+from shared_control_env.core.safe_area import Scratch, search_triangles, triangulate_compiled
 from shared_control_env.vector.intrinsics import call_of
 from shared_control_env.vector.records import PROGRAM, SOLVER, WORKSPACE, Addresses
 
@@ -54,7 +54,7 @@ def automate(scene: Record, p: Parameters, memory: Record, work: Record) -> tupl
 
 
 def triangulate(scene: Record, count: int, work: Record) -> int:
-    """Triangles of the driving region around the vehicles in it, left in ``work.triangles``.
+    """:func:`safe_area.triangulate_compiled` of a scene, the triangles left in ``work.triangles``.
 
     Args:
         scene: record of :data:`records.SCENE`.
@@ -62,9 +62,9 @@ def triangulate(scene: Record, count: int, work: Record) -> int:
         work: record of :data:`records.WORKSPACE`.
 
     Returns:
-        How many; none where :func:`delaunay.triangulate` gives up.
+        How many.
     """
-    return max(0, delaunay.triangulate(scene.region, work.corners, count, work.triangles))
+    return triangulate_compiled(scene.region, work.corners, count, work.triangles)
 
 
 def search(scene: Record, p: Parameters, n: int, work: Record) -> None:

@@ -35,15 +35,17 @@ class StableBaselinesVecEnv(VecEnv):
             raise ValueError("env must be made with autoreset_mode='same_step', which Stable-Baselines3 expects")
         self.env = env
         self.signals: dict[str, Any] = {}
-        self.render_mode = env.render_mode
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self.metadata = {**self.metadata, "render_fps": env.metadata["render_fps"]}
 
     def reset(self) -> np.ndarray:
         """Observations of new episodes, with the seeds and options given by :meth:`seed` and :meth:`set_options`."""
-        observations, self.signals = self.env.reset(seed=self._seeds, options=self._joint_options())
+        try:
+            observations, self.signals = self.env.reset(seed=self._seeds, options=self._joint_options())
+        finally:
+            self._reset_seeds()
+            self._reset_options()
         self.reset_infos = [{} for _ in range(self.num_envs)]
-        self._reset_seeds()
-        self._reset_options()
         return observations
 
     def _joint_options(self) -> dict[str, Any]:
@@ -75,6 +77,13 @@ class StableBaselinesVecEnv(VecEnv):
     def close(self) -> None:
         """Close the environments."""
         self.env.close()
+
+    def render(self, mode: str | None = None) -> np.ndarray | None:
+        """Show environment 0 in ``human`` mode; its picture in ``rgb_array`` mode."""
+        if self.render_mode == "human":
+            self.env.render()
+            return None
+        return super().render(mode)
 
     def get_images(self) -> Sequence[np.ndarray | None]:
         """The picture of environment 0 alone."""

@@ -102,3 +102,20 @@ def test_human_mode_on_a_dummy_display():
     )
     environment = {**os.environ, "SDL_VIDEODRIVER": "dummy"}
     subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+
+
+def test_the_gauges_are_those_of_the_step_that_led_to_the_picture(monkeypatch):
+    config = {"degradations": ["delay"], "authority": {"law": "none"}}
+    env = DriverModel(gym.make("SharedControl/Bend-v0", render_mode="rgb_array", config=config))
+    env.reset(seed=1_000_000)
+    for _ in range(125):
+        info = env.step(0)[4]
+    written = []
+    monkeypatch.setattr(graphics.SharedControlViewer, "_write", lambda self, text, corner: written.append(text))
+    env.render()
+    assert f"lateral risk r_y = {info['r_y']:.2f}" in written
+    degrees = np.degrees(-info["u_a_f"][1])
+    assert degrees > 0.1
+    for name in ("degraded", "limited"):  # one command under the law none
+        assert f"steering, {name}: {degrees:.2f} deg right" in written
+    assert f"acceleration, driver: {round(info['u_h_act'][0], 2) + 0.0:+.2f} m/s2" in written

@@ -2,10 +2,12 @@
 
 import numpy as np
 
-from shared_control_env.core import automation_mpc
+from shared_control_env.core import automation_mpc, single
+from shared_control_env.core.delaunay import MAX_HOLES
 from shared_control_env.core.lateral_risk import lateral_risk
 from shared_control_env.core.parameters import LateralRiskParameters
-from shared_control_env.core.safe_area import BLOCKED
+from shared_control_env.core.records import SAFE_AREA
+from shared_control_env.core.safe_area import BLOCKED, new_scratch, search_triangles, triangulate
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
 
@@ -67,3 +69,21 @@ def test_out_of_the_lane_the_driver_comes_back():
         _, _, terminated, _, info = env.step(0)
         assert not terminated
     assert abs(info["z"][1]) < 0.5
+
+
+def test_more_vehicles_than_the_compiled_triangulation_takes():
+    vehicles = [{"lane": i % 2, "position": 9.0 + 3.0 * i, "speed": 0.0} for i in range(10)]
+    change = {"lane": 1, "onset": 0.0, "duration": 9.0}
+    env = TwoLaneEnv({"faults": [], "vehicles": vehicles, "lane_change": change})
+    env.reset(seed=0)
+    env.step({"driver": np.zeros(2), "authority": np.ones(1)})
+    corners = np.zeros((10, 4, 2))
+    holes = single.sense(env.steps, env.vehicle.array, env.traffic, env.line, env.parameters, env.scene.copy(), corners)
+    assert holes > MAX_HOLES
+    triangles = triangulate(*env.scene["region"], corners[:holes])
+    area = np.zeros((), SAFE_AREA)[()]
+    region, d = env.scene["region"], float(env.scene["z"][1])
+    search_triangles(triangles, region[0], region[1], d, 2.0, new_scratch(len(triangles)), area)
+    for side in ("lower", "upper"):
+        np.testing.assert_array_equal(env.scene["area"][side], area[side])
+    assert np.ptp(area["upper"][:, 1]) > 0.5  # the vehicles bound it

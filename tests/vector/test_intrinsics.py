@@ -1,6 +1,7 @@
 """Calls by address, and the count that threads share."""
 
 from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -32,6 +33,8 @@ def test_a_solver_checks_what_it_is_called_with():
 
 
 def test_threads_take_every_piece_once():
+    together = Barrier(2)
+
     @njit(nogil=True)
     def take(taken, pieces, thread):
         piece = fetch_add(taken, 1, 1)
@@ -39,9 +42,14 @@ def test_threads_take_every_piece_once():
             pieces[piece] += thread
             piece = fetch_add(taken, 1, 1)
 
-    take(np.full(2, 9), np.zeros(1), 1.0)
-    taken, pieces = np.zeros(2, dtype=np.int64), np.zeros(1_000_000)
-    with ThreadPoolExecutor(3) as pool:
-        list(pool.map(lambda thread: take(taken, pieces, thread), (1.0, 10.0, 100.0)))
-    assert set(np.unique(pieces)) <= {1.0, 10.0, 100.0}
-    assert list(taken) == [0, len(pieces) + 3]
+    take(np.full(2, 9), np.zeros(1, dtype=np.int8), 1)
+    taken, pieces = np.zeros(2, dtype=np.int64), np.zeros(20_000_000, dtype=np.int8)
+
+    def take_as(thread):
+        together.wait()  # or the first would have taken all before the second begins
+        take(taken, pieces, thread)
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(take_as, (1, 10)))
+    assert set(np.unique(pieces)) <= {1, 10}
+    assert list(taken) == [0, len(pieces) + 2]

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError
 
 import shared_control_env  # noqa: F401
-from shared_control_env.vector import cold_start, kernel
+from shared_control_env.vector import cold_start, environment, kernel
 
 TWO_LANE = "SharedControl/TwoLane-v0"
 LANE_CHANGE = "SharedControl/LaneChange-v0"
@@ -114,14 +115,37 @@ def test_threads_are_those_that_the_process_may_use(monkeypatch):
     assert gym.make_vec(TWO_LANE, num_envs=8).unwrapped.threads == 1
 
 
-def test_two_at_a_time_do_not_meet():
-    alone = [driven(name, steps=30).step(np.zeros((4, 2)))[0] for name in (TWO_LANE, LANE_CHANGE)]
-    envs = [driven(name, steps=0, threads=2) for name in (TWO_LANE, LANE_CHANGE)]
-    for _ in range(30):
-        for env in envs:
-            env.step(np.full((4, 2), 0.05))
+def test_two_at_once_do_not_meet():
+    names = (TWO_LANE, LANE_CHANGE)
+    alone = [driven(name, steps=200).step(np.zeros((4, 2)))[0] for name in names]
+    with ThreadPoolExecutor(2) as pool:
+        envs = list(pool.map(lambda name: driven(name, steps=200, threads=2), names))
     for env, observations in zip(envs, alone, strict=True):
         np.testing.assert_array_equal(env.step(np.zeros((4, 2)))[0], observations)
+
+
+def test_a_rollout_looks_for_interrupts_between_its_pieces(monkeypatch):
+    monkeypatch.setattr(environment, "AT_ONCE", 12)
+    envs = [gym.make_vec(TWO_LANE, num_envs=4, driver=True) for _ in range(2)]
+    for env in envs:
+        env.reset(seed=0)
+    pieces, advance = [], kernel.advance
+
+    def counted(taken, steps, *arguments):
+        pieces.append(steps)
+        if len(pieces) == 3:
+            raise KeyboardInterrupt
+        advance(taken, steps, *arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(kernel, "advance", counted)
+        with pytest.raises(KeyboardInterrupt):
+            envs[0].unwrapped.rollout(10)
+    assert pieces == [3, 3, 3]
+    envs[1].unwrapped.rollout(6)
+    mask = np.array([True, False, False, False])
+    observations = [env.reset(options={"reset_mask": mask})[0] for env in envs]
+    np.testing.assert_array_equal(*observations)  # those left out show where the rollout was interrupted
 
 
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])
@@ -155,6 +179,27 @@ def test_without_autoreset_a_rollout_ends_with_the_episodes(render_mode):
         env.unwrapped.rollout(1)
 
 
-def test_rendering_before_a_reset():
+def test_rendering_out_of_turn():
+    env = gym.make_vec(TWO_LANE, num_envs=2, render_mode="rgb_array")
     with pytest.raises(ValueError, match="reset"):
-        gym.make_vec(TWO_LANE, num_envs=2, render_mode="rgb_array").render()
+        env.render()
+    env.reset(seed=0)
+    env.close()
+    with pytest.raises(ClosedEnvironmentError):
+        env.render()
+    env = gym.make_vec(TWO_LANE, num_envs=2)
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="render_mode"):
+        assert env.render() is None
+
+
+def test_the_picture_stays_where_a_reset_leaves_environment_0_out():
+    env = driven(TWO_LANE, steps=20, render_mode="rgb_array")
+    before = env.render()[0]
+    viewer = env.unwrapped._viewer_env
+    env.reset(options={"reset_mask": np.array([False, True, True, True])})
+    np.testing.assert_array_equal(env.render()[0], before)
+    closed = []
+    viewer.close = lambda: closed.append(True)
+    env.reset(options={"config": {"duration": 3.0}})
+    assert closed

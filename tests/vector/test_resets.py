@@ -6,6 +6,8 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import shared_control_env  # noqa: F401
+from shared_control_env.vector import environment
+from shared_control_env.vector.starts import write_start
 from tests.vector.agreement import assert_same_info, at, compare, gentle_driver
 
 TWO_LANE = "SharedControl/TwoLane-v0"
@@ -47,8 +49,23 @@ def test_settings_of_each():
     assert np.isfinite(env.step(np.zeros((3, 2)))[0]).all()
     with pytest.raises(ValueError, match="one for each of 3"):
         env.reset(options={"config": [{}, {}]})
-    with pytest.raises(ValueError, match=r"\[1\]\['duration'\]"):
-        env.reset(options={"config": [{}, {"duration": 1.0}, {}]})
+    for name, value in (("duration", 1.0), ("simulation_frequency", 40), ("policy_frequency", 10)):
+        task = {"task": {"dt": 0.1}} if name == "policy_frequency" else {}
+        with pytest.raises(ValueError, match=rf"\[1\]\['{name}'\]|dt"):
+            env.reset(options={"config": [{}, {name: value, **task}, {}]})
+    with pytest.raises(ValueError, match="as many entries"):
+        env.reset(options={"config": [{}, {"vehicles": []}, {}]})
+
+
+def test_changes_add_up_as_in_the_single_environment():
+    env = gym.make_vec(TWO_LANE, num_envs=2)
+    env.reset(seed=0)
+    env.reset(options={"config": [{"ego": {"speed": 9.0}}, {}]})
+    infos = env.reset(options={"config": {"duration": 3.0}})[1]
+    np.testing.assert_array_equal(infos["state"][:, 3], [9.0, 15.0])
+    infos = env.reset(options={"config": [{}, {"ego": {"speed": 8.0}}]})[1]
+    np.testing.assert_array_equal(infos["state"][:, 3], [9.0, 8.0])
+    assert env.unwrapped.config["duration"] == 3.0
 
 
 @pytest.mark.parametrize(
@@ -56,6 +73,7 @@ def test_settings_of_each():
     [
         {"seed": [1, 2, 3]},
         {"seed": [1, -2]},
+        {"seed": 1.5},
         {"options": {"config": {"other_vehicles_type": "highway_env.vehicle.behavior.IDMVehicle"}}},
         {"options": {"config": {"ego": {"speed": -1.0}}}},
         {"options": {"config": {"duration": 3.0}, "else": 1}},
@@ -190,6 +208,32 @@ def test_a_collision_does_not_outlive_its_episode():
     lengths = compare(single, many, gentle_driver, episodes=3)
     assert max(lengths) < 40  # all end in the vehicle ahead
     assert min(lengths) > 3
+
+
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_an_interrupted_reset_is_not_driven_on(mode, monkeypatch):
+    env = gym.make_vec(LANE_CHANGE, num_envs=4, autoreset_mode=mode)
+    env.reset(seed=0)
+    for _ in range(10):
+        env.step(np.zeros((4, 2)))
+    written = []
+
+    def interrupted(settings, starts, i):
+        if len(written) == 2:
+            raise KeyboardInterrupt
+        written.append(i)
+        write_start(settings, starts, i)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(environment, "write_start", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            env.reset(options={"reset_mask": np.array([True, False, True, True])})
+    if mode is AutoresetMode.NEXT_STEP:
+        infos = env.step(np.zeros((4, 2)))[4]
+        np.testing.assert_array_equal(infos["k"], [0, 10, 0, 0])
+    else:
+        with pytest.raises(ValueError, match="environment 0 has ended"):
+            env.step(np.zeros((4, 2)))
 
 
 def test_the_infos_mask_is_not_the_callers():

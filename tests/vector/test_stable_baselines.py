@@ -85,9 +85,20 @@ def test_options_change_the_settings():
     env.set_options({"confg": {}})
     with pytest.raises(ValueError, match="confg"):
         env.reset()
+    env.reset()  # options are for one reset
+
+
+def test_human_mode_is_shown(monkeypatch):
+    shown = []
+    monkeypatch.setattr(type(bare()), "render", lambda self: shown.append(self))
+    env = make(2, render_mode="human")
+    env.reset()
+    assert env.render() is None
+    assert len(shown) == 2
 
 
 def test_videos_are_recorded(tmp_path):
+    assert make(3).metadata["render_fps"] == 20
     env = VecVideoRecorder(make(3, render_mode="rgb_array"), str(tmp_path), lambda step: step == 0, video_length=5)
     env.reset()
     for _ in range(6):

@@ -25,6 +25,7 @@ from tests.vector.agreement import assert_same_info, at, compare, flat, gentle_d
 IDS = ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"]
 TWO_LANE = "SharedControl/TwoLane-v0"
 BIAS = {"onset": 0.2, "ramp": 0.4}
+MANY = {"lane": 1, "position": 9.0, "speed": 9.0}
 FAULTS = {
     "none": [],
     "steering": [{"channel": "steering", "size": 0.2, **BIAS}],
@@ -342,7 +343,8 @@ def test_a_bad_action_names_its_environment_and_moves_nothing(bad):
         (lambda env: env.step([[0.0, 0.0], [0.0], [0.0, 0.0]]), "must be numbers"),
         (lambda env: env.step([["a", "b"]] * 3), "must be numbers"),
         (lambda env: env.step(np.zeros((3, 2), dtype=complex)), "must be numbers"),
-        (lambda env: env.reset(seed=[1, 2]), "seed has 2 entries"),
+        (lambda env: env.reset(seed=[1, 2]), "one for each of 3"),
+        (lambda env: env.reset(options={"config": {"vehicles": [MANY] * 9}}), "0 to 8"),
         (lambda env: env.reset(seed=[1, 2.5, 3]), "seed of environment 1 is 2.5"),
         (lambda env: env.reset(seed=[1, 2, -3]), "seed of environment 2 is -3"),
         (lambda env: env.reset(options=[1]), "must be a dict"),
@@ -366,6 +368,8 @@ def test_refused(call, message):
     ("options", "message"),
     [
         ({"num_envs": 0}, "num_envs = 0"),
+        ({"num_envs": 2.5}, "num_envs = 2.5"),
+        ({"threads": True}, "threads = True"),
         ({"threads": 0}, "threads = 0"),
         ({"driver": object()}, "must be True or False"),
         ({"autoreset_mode": "sometimes"}, "one of"),
@@ -397,4 +401,5 @@ def test_starts_without_highway_env():
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_memory_of_an_environment(name):
-    assert gym.make_vec(name, num_envs=64).unwrapped.bytes_per_environment <= 4096
+    env = gym.make_vec(name, num_envs=64).unwrapped
+    assert sum(array.nbytes for array in env._batch) / 64 == env.bytes_per_environment <= 4096

@@ -25,7 +25,7 @@ from tests.vector.agreement import assert_same_info, at, compare, flat, gentle_d
 IDS = ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"]
 TWO_LANE = "SharedControl/TwoLane-v0"
 BIAS = {"onset": 0.2, "ramp": 0.4}
-MANY = {"lane": 1, "position": 9.0, "speed": 9.0}
+NINE = [{"lane": 1, "position": 9.0 * i, "speed": 9.0} for i in range(9)]
 FAULTS = {
     "none": [],
     "steering": [{"channel": "steering", "size": 0.2, **BIAS}],
@@ -344,7 +344,7 @@ def test_a_bad_action_names_its_environment_and_moves_nothing(bad):
         (lambda env: env.step([["a", "b"]] * 3), "must be numbers"),
         (lambda env: env.step(np.zeros((3, 2), dtype=complex)), "must be numbers"),
         (lambda env: env.reset(seed=[1, 2]), "one for each of 3"),
-        (lambda env: env.reset(options={"config": {"vehicles": [MANY] * 9}}), "0 to 8"),
+        (lambda env: env.reset(options={"config": {"vehicles": NINE}}), "0 to 8"),
         (lambda env: env.reset(seed=[1, 2.5, 3]), "seed of environment 1 is 2.5"),
         (lambda env: env.reset(seed=[1, 2, -3]), "seed of environment 2 is -3"),
         (lambda env: env.reset(options=[1]), "must be a dict"),
@@ -375,7 +375,7 @@ def test_refused(call, message):
         ({"autoreset_mode": "sometimes"}, "one of"),
         ({"render_mode": "ansi"}, "render_mode = 'ansi'"),
         ({"config": {"other_vehicles_type": "highway_env.vehicle.behavior.IDMVehicle"}}, "not in the kernel"),
-        ({"config": {"vehicles": [{"lane": 1, "position": 9.0 * i, "speed": 9.0} for i in range(9)]}}, "0 to 8"),
+        ({"config": {"vehicles": NINE}}, "0 to 8"),
         ({"config": {"authority": {"law": "papr"}}}, "'paper'"),
     ],
 )

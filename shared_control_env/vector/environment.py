@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -314,7 +314,7 @@ class SharedControlVectorEnv(VectorEnv):
         """
         self._check_ready()
         checked = self._checked_actions(actions)
-        out = self._outputs()
+        out = self._outputs(np.empty)  # all environments move, and write all of it
         _, finals = self._drive(checked, out)
         self._show()
         infos = self._infos(out.infos, out.solver, self._everyone.copy())
@@ -526,16 +526,16 @@ class SharedControlVectorEnv(VectorEnv):
         self._threads.run(work)
         return Rollout(rewards, ends)
 
-    def _outputs(self) -> Outputs:
+    def _outputs(self, allocate: Callable[..., np.ndarray] = np.zeros) -> Outputs:
         """New arrays for one step."""
         n = self.num_envs
         return Outputs(
-            observations=np.zeros((n, len(FEATURES)), dtype=np.float32),
-            rewards=np.zeros(n),
-            terminations=np.zeros(n, dtype=bool),
-            truncations=np.zeros(n, dtype=bool),
-            infos=np.zeros(n, INFO),
-            solver=np.zeros(n, SOLVER),
+            observations=allocate((n, len(FEATURES)), np.float32),
+            rewards=allocate(n),
+            terminations=allocate(n, bool),
+            truncations=allocate(n, bool),
+            infos=allocate(n, INFO),
+            solver=allocate(n, SOLVER),
         )
 
     def _infos(self, infos: np.ndarray, solver: np.ndarray, mask: np.ndarray) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from gymnasium.error import ClosedEnvironmentError
 
 import shared_control_env  # noqa: F401
 from shared_control_env.vector import cold_start, environment, kernel
+from tests.vector.agreement import flat
 
 TWO_LANE = "SharedControl/TwoLane-v0"
 LANE_CHANGE = "SharedControl/LaneChange-v0"
@@ -107,6 +108,35 @@ def test_goes_on_in_a_forked_process():
     )
     result = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=120)
     assert result.stdout.strip() == "0", result.stderr
+
+
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+@pytest.mark.parametrize("driver", [False, True])
+def test_a_step_writes_all_that_it_returns(driver, mode, monkeypatch):
+    options = {"driver": driver, "config": {"duration": 0.2}, "autoreset_mode": mode}
+    envs = [gym.make_vec(LANE_CHANGE, num_envs=3, **options) for _ in range(2)]
+    for env in envs:
+        env.reset(seed=0)
+    real = np.empty
+
+    def dirty(*arguments):
+        array = real(*arguments)
+        array.view(np.uint8)[...] = 0xA5
+        return array
+
+    for _ in range(9):
+        clean = flat_step(envs[0])
+        with monkeypatch.context() as patch:
+            patch.setattr(environment.np, "empty", dirty)
+            written = flat_step(envs[1])
+        assert clean.keys() == written.keys()
+        for name, value in clean.items():
+            np.testing.assert_array_equal(written[name], value, err_msg=name)
+
+
+def flat_step(env):
+    *values, infos = env.step(np.zeros((3, 2)))
+    return {**flat(infos), **dict(enumerate(values))}
 
 
 def test_threads_are_those_that_the_process_may_use(monkeypatch):

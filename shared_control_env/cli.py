@@ -30,8 +30,13 @@ from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
-COLUMNS = ("collisions", "road_departures", "lateral_rms", "driver_effort", "conflict")
-"""Metrics of the table that is printed; all are in the report."""
+COLUMNS = {
+    "terminated": "failures",
+    "collisions": "collisions",
+    "lateral_rms": "lateral rms",
+    "driver_effort": "driver effort",
+}
+"""Columns of the results whose means are printed, and their titles; a failure is a collision or a road departure."""
 
 
 def _names(text: str, known: dict[str, Any]) -> list[str]:
@@ -98,8 +103,8 @@ def summary(table: Any) -> Table:
     printed = Table(title="Means over all episodes", pad_edge=False)
     for name in ("authority", "driver"):
         printed.add_column(name, no_wrap=True)
-    for name in COLUMNS:
-        printed.add_column(name.replace("_", " "), justify="right", min_width=len(max(name.split("_"), key=len)))
+    for title in COLUMNS.values():
+        printed.add_column(title, justify="right", min_width=len(max(title.split(), key=len)))
     means = table.groupby(["authority", "driver"])[list(COLUMNS)].mean()
     for (authority, driver), row in means.iterrows():
         printed.add_row(authority, driver, *(f"{value:.2g}" for value in row))

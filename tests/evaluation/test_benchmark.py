@@ -1,5 +1,6 @@
 """Runs of the benchmark: the same rows however they are run, kept whole, and refused where they do not belong."""
 
+import io
 import json
 import os
 import signal
@@ -10,7 +11,9 @@ import time
 import numpy as np
 import pandas as pd
 import pytest
+from rich.console import Console
 
+from shared_control_env.cli import summary
 from shared_control_env.controllers.scripted import ScriptedDriver
 from shared_control_env.evaluation import AUTHORITIES, DRIVERS, METRICS, SUITES, AuthorityEntry, Suite, evaluate
 from shared_control_env.evaluation import runner as runner_module
@@ -267,3 +270,22 @@ def test_a_full_disk_is_said_and_what_was_done_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(ResultsFolder, "add", real)
     assert CliRunner().invoke(app, arguments).exit_code == 0
     assert len(pd.read_parquet(tmp_path / "episodes.parquet")) == 4
+
+
+def test_the_printed_table_counts_every_failure_and_fits_a_terminal():
+    names = [(driver, authority) for driver in ("mpc", "over_reacting") for authority in ("proportional", "none")]
+    rows = [
+        {"driver": driver, "authority": authority, "terminated": ends, "collisions": ends and side, **METERED}
+        for driver, authority in names
+        for ends, side in ((1, 1), (1, 0), (0, 0), (0, 0))
+    ]
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(summary(pd.DataFrame(rows)))
+    text = console.export_text()
+    assert max(map(len, text.splitlines())) <= 80
+    for word in ("failures", "collisions", "lateral", "rms", "driver", "effort"):
+        assert word in text
+    assert text.count("0.5 ") == text.count("0.25 ") == 4
+
+
+METERED = {"lateral_rms": 0.123, "driver_effort": 0.0456}

@@ -49,10 +49,11 @@ def test_settings_of_each():
     assert np.isfinite(env.step(np.zeros((3, 2)))[0]).all()
     with pytest.raises(ValueError, match="one for each of 3"):
         env.reset(options={"config": [{}, {}]})
-    for name, value in (("duration", 1.0), ("simulation_frequency", 40), ("policy_frequency", 10)):
-        task = {"task": {"dt": 0.1}} if name == "policy_frequency" else {}
-        with pytest.raises(ValueError, match=rf"\[1\]\['{name}'\]|dt"):
-            env.reset(options={"config": [{}, {name: value, **task}, {}]})
+    idm = "highway_env.vehicle.behavior.IDMVehicle"
+    different = {"duration": 1.0, "simulation_frequency": 40, "policy_frequency": 10, "other_vehicles_type": idm}
+    for name, value in different.items():
+        with pytest.raises(ValueError, match=rf"\[1\]\['{name}'\]"):
+            env.reset(options={"config": [{}, {name: value}, {}]})
     with pytest.raises(ValueError, match="as many entries"):
         env.reset(options={"config": [{}, {"vehicles": []}, {}]})
 

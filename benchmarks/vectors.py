@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.environments import highway_config
 from benchmarks.timing import Timing, time_block
+from shared_control_env.vector.threads import cores
 
 SIZES = (1, 64, 1024, 4096)
 """Numbers of environments."""
@@ -61,11 +62,6 @@ def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/T
 def _rate(seconds: list[float]) -> float:
     """Mean steps a second of some times a step."""
     return float(np.mean(1.0 / np.array(seconds)))
-
-
-def cores() -> list[int]:
-    """Cores that this process may use, where the system says."""
-    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
 
 
 def _block(id: str, num_envs: int, threads: int, driver: bool) -> Callable[[], float]:

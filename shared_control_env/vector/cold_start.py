@@ -7,7 +7,6 @@ that threads would not help.
 from __future__ import annotations
 
 import multiprocessing
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from typing import Any
 
 from shared_control_env.core.jit import is_cached
 from shared_control_env.vector import kernel, solvers
+from shared_control_env.vector.threads import cores
 
 PATIENCE = 120.0
 """How long the other process is waited for [s]; after that this one compiles the solvers itself."""
@@ -41,12 +41,7 @@ def _worthwhile() -> bool:
     worker = multiprocessing.parent_process() is not None
     if compiled.signatures or worker or getattr(sys, "frozen", False):
         return False
-    return cores() > 1 and not is_cached(kernel.advance)
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return len(cores()) > 1 and not is_cached(kernel.advance)
 
 
 def _compile_beside(compile_kernel: Callable[[], None], driver: bool) -> None:

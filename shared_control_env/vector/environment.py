@@ -39,7 +39,7 @@ from shared_control_env.vector.records import (
     Setup,
 )
 from shared_control_env.vector.starts import empty_starts, sizes_for, write_start
-from shared_control_env.vector.threads import Threads
+from shared_control_env.vector.threads import Threads, cores
 
 KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 """Traffic that the kernel knows."""
@@ -139,11 +139,11 @@ class SharedControlVectorEnv(VectorEnv):
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
         few = max(1, num_envs // FEWEST_PER_THREAD)
-        self._threads = Threads(min(threads, num_envs) if threads is not None else min(cold_start.cores(), few))
+        self._threads = Threads(min(threads, num_envs) if threads is not None else min(len(cores()), few))
         self._works = np.zeros(self._threads.count, WORKSPACE)
         self._programs = np.zeros(self._threads.count, PROGRAM)
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
-        self._nobody, self._everyone = np.zeros(num_envs, dtype=bool), np.ones(num_envs, dtype=bool)
+        self._everyone = np.ones(num_envs, dtype=bool)
         self._seeds: list[int | None] = [None] * num_envs
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._solvers = NOT_LOADED
@@ -180,7 +180,6 @@ class SharedControlVectorEnv(VectorEnv):
             dt=1.0 / settings.simulation_frequency,
             limiter=self._limiter,
             driver=self._driver,
-            autoreset=self._mode is AutoresetMode.NEXT_STEP,
             solvers=self._solvers,
         )
         self._batch = Batch(
@@ -315,7 +314,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._check_ready()
         checked = self._checked_actions(actions)
         out = self._outputs(np.empty)  # all environments move, and write all of it
-        _, finals = self._drive(checked, out)
+        _, finals = self._drive(1, checked, out)
         self._show()
         infos = self._infos(out.infos, out.solver, self._everyone.copy())
         if finals is not None:
@@ -345,16 +344,12 @@ class SharedControlVectorEnv(VectorEnv):
         if not _is_integer(steps) or steps < 1:
             raise ValueError(f"steps = {steps!r} must be an integer of at least 1")
         out = self._outputs()
+        one_by_one = self._random or self.render_mode is not None or self._mode is AutoresetMode.SAME_STEP
+        piece = 1 if one_by_one else max(1, AT_ONCE // self.num_envs)
         taken = []
-        if self._random or self.render_mode is not None or self._mode is AutoresetMode.SAME_STEP:
-            for _ in range(steps):
-                taken.append(self._drive(self._no_actions, out)[0])
-                self._show()
-        else:
-            piece = max(1, AT_ONCE // self.num_envs)
-            for first in range(0, steps, piece):
-                n = min(piece, steps - first)
-                taken.append(self._move(n, self._everyone, self._nobody, self._no_actions, out))
+        for first in range(0, steps, piece):
+            taken.append(self._drive(min(piece, steps - first), self._no_actions, out)[0])
+            self._show()
         return Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
@@ -445,7 +440,8 @@ class SharedControlVectorEnv(VectorEnv):
         """Have all compiled that a step runs."""
 
         def compile_kernel() -> None:
-            self._advance(1, self._nobody, self._nobody, self._no_actions, self._outputs())
+            nobody = np.zeros(self.num_envs, dtype=bool)
+            self._advance(1, nobody, False, self._no_actions, self._outputs())
 
         self._solvers = cold_start.compile_all(compile_kernel, self._driver)
         self._setup = self._setup._replace(solvers=self._solvers)
@@ -461,24 +457,29 @@ class SharedControlVectorEnv(VectorEnv):
     def _begin(self, mask: np.ndarray, out: Outputs) -> None:
         """Begin an episode in each environment that the mask names."""
         self._draw(mask)
-        self._move(1, mask, mask, self._no_actions, out)
+        self._move(1, mask, True, self._no_actions, out)
 
     def _draw(self, mask: np.ndarray) -> None:
         """Draw an episode for each environment that the mask names, if anything is random; all of them, or none."""
         drawn = {}
         if self._random:
             drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
-        self._batch.ended[mask] = True  # until they have begun: an interrupt may come between
+        self._batch.ended[mask] = True  # so that the kernel begins them, even if an interrupt comes between
         for i, episode in drawn.items():
             self._episodes[i] = episode
             write_start(episode, self._batch, i)
 
-    def _drive(self, actions: Actions, out: Outputs) -> tuple[Rollout, Outputs | None]:
-        """One step of all environments; also what episodes ended with that began anew in the same step, if any."""
-        if self._mode is AutoresetMode.NEXT_STEP:
+    def _drive(self, steps: int, actions: Actions, out: Outputs) -> tuple[Rollout, Outputs | None]:
+        """Steps of all environments, one where an episode is drawn or begins in the step that another ends in.
+
+        Returns:
+            Rewards and ends; what those episodes ended with that others followed in the same step, None without any.
+        """
+        next_step = self._mode is AutoresetMode.NEXT_STEP
+        if next_step:
             self._draw(self._batch.ended)
-        result = self._move(1, self._everyone, self._nobody, actions, out)
-        ended = result.ends[0]
+        result = self._move(steps, self._everyone, next_step, actions, out)
+        ended = result.ends[-1]
         if self._mode is not AutoresetMode.SAME_STEP or not ended.any():
             return result, None
         finals = self._outputs()
@@ -489,17 +490,17 @@ class SharedControlVectorEnv(VectorEnv):
             getattr(out, name)[ended] = getattr(finals, name)[ended]
         return result, finals
 
-    def _move(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
+    def _move(self, steps: int, active: np.ndarray, anew: bool, actions: Actions, out: Outputs) -> Rollout:
         """Advance environments, and keep what a later reset or picture needs even if an interrupt comes then."""
         try:
-            return self._advance(steps, active, resets, actions, out)
+            return self._advance(steps, active, anew, actions, out)
         finally:
             self._observations = out.observations.copy()
             if self.render_mode is not None and active[0]:
                 self._noted = out.infos[0].copy()
                 self._path[self._batch.scenes[0]["k"]] = self._batch.states[0, :2]
 
-    def _advance(self, steps: int, active: np.ndarray, resets: np.ndarray, actions: Actions, out: Outputs) -> Rollout:
+    def _advance(self, steps: int, active: np.ndarray, anew: bool, actions: Actions, out: Outputs) -> Rollout:
         """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
         rewards = np.zeros((steps, self.num_envs))
         ends = np.zeros((steps, self.num_envs), dtype=bool)
@@ -510,7 +511,7 @@ class SharedControlVectorEnv(VectorEnv):
                 taken,
                 steps,
                 active,
-                resets,
+                anew,
                 actions.commands,
                 actions.alphas,
                 self._batch,

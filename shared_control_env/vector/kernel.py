@@ -206,7 +206,7 @@ def advance_one(
 def advance_through(
     i: int,
     steps: int,
-    resets: np.ndarray,
+    anew: bool,
     commands: np.ndarray,
     alphas: np.ndarray,
     batch: Batch,
@@ -218,16 +218,13 @@ def advance_through(
     program: Record,
 ) -> None:
     """Advance environment i by some steps in a row; arguments as those of :func:`advance`."""
-    resetting = resets[i]
     for k in range(steps):
-        if batch.ended[i] and not resetting:
-            if not setup.autoreset:
-                break
-            resetting = True
+        resetting = batch.ended[i]
+        if resetting and not anew:
+            break
         advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
         rewards[k, i] = out.rewards[i]
         ends[k, i] = batch.ended[i] = out.terminations[i] or out.truncations[i]
-        resetting = False
 
 
 @jit
@@ -235,7 +232,7 @@ def advance(
     taken: np.ndarray,
     steps: int,
     active: np.ndarray,
-    resets: np.ndarray,
+    anew: bool,
     commands: np.ndarray,
     alphas: np.ndarray,
     batch: Batch,
@@ -256,7 +253,7 @@ def advance(
         taken: environments of each share that threads have taken so far, (threads,).
         steps: how many time steps; the actions are held or bound.
         active: environments that are advanced at all, (N,).
-        resets: environments whose first step is a reset, (N,).
+        anew: whether an environment whose episode has ended begins the next in a step; if not, it stands still.
         commands: driver's commands over their limits, (N, 2).
         alphas: authorities, (N, 1).
         batch, setup: see their types.
@@ -276,5 +273,5 @@ def advance(
         while first < end:
             for i in range(first, min(first + TAKEN_AT_ONCE, end)):
                 if active[i]:
-                    advance_through(i, steps, resets, commands, alphas, batch, setup, out, rewards, ends, work, program)
+                    advance_through(i, steps, anew, commands, alphas, batch, setup, out, rewards, ends, work, program)
             first = begin + fetch_add(taken, share, TAKEN_AT_ONCE)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from shared_control_env.core import active_set_qp, condensing, delaunay
+from shared_control_env.core import active_set_qp, condensing, delaunay, safe_area
 from shared_control_env.core.active_set_qp import MAX_ROWS, MAX_VARIABLES
 from shared_control_env.core.delaunay import MAX_TRIANGLES
 
@@ -87,7 +87,6 @@ class Setup(NamedTuple):
         dt: of a simulation step [s].
         limiter: whether the fuzzy inference decides alpha_a.
         driver: whether the predictive driver decides the driver's command.
-        autoreset: whether the step after an episode's end begins the next; if not, the environment stands still.
         solvers: where the compiled solvers are.
     """
 
@@ -97,7 +96,6 @@ class Setup(NamedTuple):
     dt: float
     limiter: bool
     driver: bool
-    autoreset: bool
     solvers: Addresses
 
 
@@ -132,18 +130,10 @@ SOLVER = np.dtype(
 )
 """Report of the driver's solver, as ``info["driver"]``."""
 
+_scratch: Any = safe_area.new_scratch
 SEARCH_SCRATCH = np.dtype(
-    [
-        ("neighbours", np.int64, (MAX_TRIANGLES, 3)),
-        ("distance", np.float64, (MAX_TRIANGLES,)),
-        ("at", np.float64, (MAX_TRIANGLES, 2)),
-        ("parent", np.int64, (MAX_TRIANGLES,)),
-        ("entry", np.int64, (MAX_TRIANGLES,)),
-        ("done", np.int8, (MAX_TRIANGLES,)),
-        ("sequence", np.int64, (MAX_TRIANGLES,)),
-        ("stack", np.int64, (3 * MAX_TRIANGLES, 2)),
-        ("ring", np.float64, (3 * MAX_TRIANGLES + 2, 2)),
-    ],
+    # As Python, since compiling it would take time.
+    [(name, array.dtype, array.shape) for name, array in _scratch.py_func(MAX_TRIANGLES)._asdict().items()],
     align=True,
 )
 """Arrays of :class:`safe_area.Scratch`."""

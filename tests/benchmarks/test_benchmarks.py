@@ -4,6 +4,7 @@ import numpy as np
 
 from benchmarks import controllers, environments, parts, suite, vectors
 from benchmarks.timing import Timing, time_block
+from shared_control_env.vector.threads import cores
 
 
 def test_timing():
@@ -31,11 +32,11 @@ def test_parts_and_vectors_run():
     assert one.one.median > 0.0
     assert (one.all, one.ratio) == (None, 1.0)
     several = vectors.kernel(64, False, 1, "SharedControl/DenseTraffic-v0")
-    assert (several.all is not None) == (len(vectors.cores()) > 1)
+    assert (several.all is not None) == (len(cores()) > 1)
     assert several.ratio > 0.0
-    allowed = vectors.cores()
+    allowed = cores()
     many = vectors.kernel(1024, False, 1)
-    assert vectors.cores() == allowed
+    assert cores() == allowed
     assert (many.all is None) is (len(allowed) == 1)
     assert many.ratio > 0.0
     (seconds,) = suite.seconds_for(10, 1, "paper")

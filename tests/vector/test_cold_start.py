@@ -19,7 +19,7 @@ def cold(monkeypatch):
 
     monkeypatch.setattr(cold_start.kernel, "advance", Uncompiled())
     monkeypatch.setattr(cold_start, "is_cached", lambda function: False)
-    monkeypatch.setattr(cold_start, "cores", lambda: 2)
+    monkeypatch.setattr(cold_start, "cores", lambda: [0, 1])
     monkeypatch.setattr(cold_start.multiprocessing, "parent_process", lambda: None)
     noted = []
 
@@ -61,7 +61,7 @@ def test_without_another_process_the_solvers_are_compiled_all_the_same(cold, mon
     elif reason == "compiled":
         cold_start.kernel.advance.signatures = ("one",)
     elif reason == "one core":
-        monkeypatch.setattr(cold_start, "cores", lambda: 1)
+        monkeypatch.setattr(cold_start, "cores", lambda: [0])
     else:
         monkeypatch.setattr(cold_start.multiprocessing, "parent_process", lambda: "a pool")
     found = cold_start.compile_all(lambda: cold.append("kernel"), driver=False)

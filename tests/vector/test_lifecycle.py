@@ -15,7 +15,7 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError
 
 import shared_control_env  # noqa: F401
-from shared_control_env.vector import cold_start, environment, kernel
+from shared_control_env.vector import environment, kernel
 from tests.vector.agreement import flat
 
 TWO_LANE = "SharedControl/TwoLane-v0"
@@ -140,7 +140,7 @@ def flat_step(env):
 
 
 def test_threads_are_those_that_the_process_may_use(monkeypatch):
-    monkeypatch.setattr(cold_start, "cores", lambda: 3)
+    monkeypatch.setattr(environment, "cores", lambda: [0, 1, 2])
     assert gym.make_vec(TWO_LANE, num_envs=1000).unwrapped.threads == 3
     assert gym.make_vec(TWO_LANE, num_envs=8).unwrapped.threads == 1
 

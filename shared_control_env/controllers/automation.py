@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from time import perf_counter
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -10,6 +11,26 @@ from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import automation_mpc, single
 from shared_control_env.core.condensing import WORKSPACE
 from shared_control_env.core.records import AUTOMATION_MEMORY
+
+
+@runtime_checkable
+class Planner(Protocol):
+    """Anything that decides the automation's desired command.
+
+    It may have an attribute ``failures``: steps since the reset at which it held its last command.
+    """
+
+    def reset(self) -> None:
+        """Begin an episode."""
+        ...
+
+    def act(self, scene: np.ndarray) -> Solution:
+        """Decide on one scene; ``command`` is u_a,des = [a, delta] [m/s^2, rad].
+
+        Args:
+            scene: record of :data:`records.SCENE` as the automation takes it for, an array of no dimension.
+        """
+        ...
 
 
 class Automation:

@@ -114,7 +114,7 @@ class PredictiveDriver:
             self._solver.update(q=self.q, l=self.low, u=self.high, Px=P, Ax=A)
         result = self._solver.solve(raise_error=False)
         info = result.info
-        found = info.status_val == osqp.SolverStatus.OSQP_SOLVED
+        found = info.status_val == osqp.SolverStatus.OSQP_SOLVED and bool(np.isfinite(result.x[:2]).all())
         if found:
             self._last = np.clip(result.x[:2], -1.0, 1.0) * self._bounds
         else:

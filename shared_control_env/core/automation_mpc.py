@@ -184,6 +184,8 @@ def solve(U: np.ndarray, scene: Record, p: Parameters, iterations: int, work: Re
         if residual <= TOLERANCE:
             return CONVERGED, iteration, residual, value
         slope = _plan_step(U, p, work)
+        if not np.isfinite(slope):  # the Hessian is not positive definite in floating point
+            return FAILED, iteration, residual, value
         last = iteration + 1 == iterations
         length, trial_value = 2.0, np.inf
         while not trial_value <= value + _ARMIJO * length * slope:

@@ -184,6 +184,12 @@ def is_on_road(scene: Record, p: Parameters) -> bool:
     return p.task.road_low <= scene.z[1] <= p.task.road_high
 
 
+@jit
+def has_run_out(scene: Record, steps: int, p: Parameters) -> bool:
+    """Whether an episode is truncated: by its duration of so many steps, or because the road ends."""
+    return scene.k >= steps or scene.z[0] >= p.task.road_end
+
+
 @jit_inlined
 def count_departures(scene: Record, p: Parameters, memory: Record) -> None:
     """Count in memory each time that the ego's centre leaves the lane to keep."""
@@ -221,7 +227,8 @@ def conclude(
     Returns:
         Reward, and whether the episode terminates: by a collision or off the road.
     """
-    on_road = is_on_road(scene, p)
+    z = scene.z
+    on_road = is_on_road(scene, p) and np.isfinite(z[0] + z[2] + z[3] + z[4] + z[5])
     terminated = crashed or not on_road
     reward_terms(previous_s, scene, signals, last_a, terminated, p, terms)
     count_departures(scene, p, memory)

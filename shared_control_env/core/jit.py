@@ -5,19 +5,18 @@ from __future__ import annotations
 import gc
 import sys
 from collections.abc import Callable
-from functools import cache
-from hashlib import sha256
+from functools import wraps
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeVar, cast
 
-from numba import njit, types
+import numpy as np
+from numba import config, njit, types
 from numba.core import event
 
-F = TypeVar("F", bound=Callable[..., Any])
+from shared_control_env.core.cache import cache_of, say_once
 
-_PACKAGE = Path(__file__).parent.parent
-_COMPILED_SOURCES = ("core/*.py", *(f"vector/{name}.py" for name in ("intrinsics", "kernel", "records", "solvers")))
+F = TypeVar("F", bound=Callable[..., Any])
 
 
 def jit(function: F) -> F:
@@ -45,7 +44,6 @@ def jit_inlined(function: F) -> F:
 
 def _compile(function: F, inline: str, allocating: bool = False) -> F:
     options: dict[str, Any] = {
-        "cache": True,
         "error_model": "numpy",
         "nogil": True,
         "inline": inline,
@@ -55,10 +53,49 @@ def _compile(function: F, inline: str, allocating: bool = False) -> F:
         # A private function is never called from Python, so it needs no entry for that.
         "no_cpython_wrapper": function.__name__.startswith("_"),
     }
+    if is_interpreted():
+        return _interpreted(function)
     dispatcher: Any = njit(**options)(function)
     _ignore_literals(dispatcher)
-    _drop_stale_cache(dispatcher.stats.cache_path)
+    dispatcher._cache = cache_of(function)
     return cast(F, dispatcher)
+
+
+def is_interpreted() -> bool:
+    """Whether the core runs as Python, since the environment variable ``NUMBA_DISABLE_JIT`` is set."""
+    settings: Any = config
+    return bool(settings.DISABLE_JIT)
+
+
+def _interpreted(function: F) -> F:
+    """The function as Python, for debuggers (``NUMBA_DISABLE_JIT=1``): fields of records are attributes there too."""
+    say_once("NUMBA_DISABLE_JIT is set: the core runs as Python, some thousand times slower.")
+
+    @wraps(function)
+    def interpreted(*arguments: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return function(*(_with_attributes(argument) for argument in arguments))
+
+    interpreted.py_func = function  # type: ignore[attr-defined]
+    return cast(F, interpreted)
+
+
+_RECORD: Any = np.record
+
+
+class _Fields(_RECORD):
+    """A record whose fields are attributes, those too that NumPy has another meaning for, such as ``size``."""
+
+    def __getattribute__(self, name: str) -> Any:
+        fields = object.__getattribute__(self, "dtype").fields
+        return _with_attributes(self[name]) if name in fields else object.__getattribute__(self, name)
+
+
+def _with_attributes(argument: Any) -> Any:
+    """A view of a record or of an array of them whose fields are attributes."""
+    if isinstance(argument, np.void | np.ndarray) and argument.dtype.names and argument.dtype.type is not _Fields:
+        return argument.view(np.dtype((_Fields, argument.dtype)))
+    return argument
 
 
 def _ignore_literals(dispatcher: Any) -> None:
@@ -77,29 +114,8 @@ def is_cached(function: Callable[..., Any]) -> bool:
     """Whether numba's cache on disk holds a compiled form of a function of this package."""
     dispatcher: Any = function
     module, name = dispatcher.py_func.__module__.rsplit(".", 1)[-1], dispatcher.py_func.__qualname__
-    return any(Path(dispatcher.stats.cache_path).glob(f"{module}.{name}-*.nbi"))
-
-
-@cache
-def _drop_stale_cache(directory: str) -> None:
-    """Empty a cache directory that older sources filled.
-
-    Numba compares only a function's own file, yet inlines what it calls: after a change in
-    one file the callers in others would silently keep the old equation.
-    """
-    sources = sorted(path for pattern in _COMPILED_SOURCES for path in _PACKAGE.glob(pattern))
-    digest = sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
-    stamp = Path(directory) / "shared_control_env.sha256"
-    if stamp.is_file() and stamp.read_text() == digest:
-        return
-    try:
-        for pattern in ("*.nbi", "*.nbc"):
-            for path in Path(directory).glob(pattern):
-                path.unlink(missing_ok=True)
-        stamp.parent.mkdir(parents=True, exist_ok=True)
-        stamp.write_text(digest)
-    except OSError:  # A directory that cannot be written cannot hold a stale cache of ours either.
-        return
+    path = dispatcher.stats.cache_path
+    return path is not None and any(Path(path).glob(f"{module}.{name}-*.nbi"))
 
 
 class _Compilation(event.Listener):
@@ -121,7 +137,7 @@ class _Compilation(event.Listener):
             self.collecting = gc.isenabled()
             gc.disable()
         self.depth += 1
-        if pause > 5.0 and function.__module__.startswith("shared_control_env"):
+        if pause > 5.0 and function.__module__.startswith("shared_control_env") and sys.stderr is not None:
             print(
                 "shared_control_env: compiling the numerical core for this use and machine, once "
                 "(up to a minute); later runs read it from numba's cache.",

@@ -10,12 +10,37 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge, Gt, Interval
+from annotated_types import Interval
 
-Positive = Annotated[float, Gt(0.0)]
-NonNegative = Annotated[float, Ge(0.0)]
-Count = Annotated[int, Gt(0)]
+FASTEST = 60.0
+"""Highest speed that can be set [m/s]: half as much again as the model is right for."""
+
+LONGEST_ROAD = 1e5
+"""Longest road that can be set [m]: an hour at 100 km/h."""
+
+MOST_LANES = 30
+"""Largest number of lanes that can be set: the widest motorways have 26."""
+
+LARGEST_ACCELERATION = 20.0
+"""Largest limit of the acceleration that can be set [m/s^2]: twice what road tyres transmit."""
+
+LARGEST_STEERING = math.pi / 2
+"""Bound of the limit of the steering angle [rad]: wheels across the car."""
+
+# Bounds of what can be set. In SI units nothing about a road vehicle is larger than a million, but for weights; squares
+# and quotients of what lies within stay far from the limits of floating point.
+Positive = Annotated[float, Interval(ge=1e-12, le=1e6)]
+NonNegative = Annotated[float, Interval(ge=0.0, le=1e6)]
 Fraction = Annotated[float, Interval(ge=0.0, le=1.0)]
+Weight = Annotated[float, Interval(ge=0.0, le=1e12)]
+PositiveWeight = Annotated[float, Interval(ge=1e-12, le=1e12)]
+Speed = Annotated[float, Interval(ge=0.0, le=FASTEST)]  # [m/s]
+TargetSpeed = Annotated[float, Interval(ge=0.1, le=FASTEST)]  # [m/s]
+Mass = Annotated[float, Interval(ge=100.0, le=1e5)]  # [kg], from a light quadricycle to a road train
+Inertia = Annotated[float, Interval(ge=10.0, le=1e6)]  # [kg m^2], of the same
+BodyLength = Annotated[float, Interval(ge=0.1, le=30.0)]  # [m], of the same
+BodyWidth = Annotated[float, Interval(ge=0.1, le=5.0)]  # [m]
+Stiffness = Annotated[float, Interval(ge=1e3, le=1e7)]  # [N/rad]
 
 
 class VehicleParameters(NamedTuple):
@@ -32,14 +57,14 @@ class VehicleParameters(NamedTuple):
         width: body width v_w [m]; paper, Table V.
     """
 
-    m: Positive = 2000.0
-    I_z: Positive = 1300.0
-    l_f: Positive = 1.21
-    l_r: Positive = 1.05
-    C_f: Positive = 60_000.0
-    C_r: Positive = 60_000.0
-    length: Positive = 5.0
-    width: Positive = 2.0
+    m: Mass = 2000.0
+    I_z: Inertia = 1300.0
+    l_f: BodyLength = 1.21
+    l_r: BodyLength = 1.05
+    C_f: Stiffness = 60_000.0
+    C_r: Stiffness = 60_000.0
+    length: BodyLength = 5.0
+    width: BodyWidth = 2.0
 
 
 class Limits(NamedTuple):
@@ -50,8 +75,8 @@ class Limits(NamedTuple):
         delta_max: largest front steering angle [rad]; paper, Section VI (30 deg).
     """
 
-    a_max: Positive = 5.0
-    delta_max: Annotated[float, Interval(gt=0.0, lt=math.pi / 2)] = math.radians(30.0)
+    a_max: Annotated[float, Interval(ge=1e-9, le=LARGEST_ACCELERATION)] = 5.0
+    delta_max: Annotated[float, Interval(ge=1e-9, lt=LARGEST_STEERING)] = math.radians(30.0)
 
 
 class PredictiveParameters(NamedTuple):
@@ -77,12 +102,12 @@ class PredictiveParameters(NamedTuple):
 
     H_p: Annotated[int, Interval(ge=1, le=30)] = 10
     H_c: Annotated[int, Interval(ge=1, le=10)] = 3
-    W: NonNegative = 1.0
-    H: NonNegative = 0.1
-    N: NonNegative = 0.01
-    Q_a: Positive = 0.05
-    Q_delta: Positive = 1.0
-    R: NonNegative = 1e-4
+    W: Weight = 1.0
+    H: Weight = 0.1
+    N: Weight = 0.01
+    Q_a: PositiveWeight = 0.05
+    Q_delta: PositiveWeight = 1.0
+    R: Weight = 1e-4
 
 
 class SafeAreaParameters(NamedTuple):
@@ -173,7 +198,7 @@ class DriverLagParameters(NamedTuple):
         T_h: time constant [s]; paper, Section VI.
     """
 
-    K_h: NonNegative = 1.0
+    K_h: Annotated[float, Interval(ge=0.0, le=100.0)] = 1.0
     T_h: Positive = 0.2
 
 
@@ -201,13 +226,13 @@ class RewardParameters(NamedTuple):
         failure: weight of the step that ends in a collision or off the road [-].
     """
 
-    progress: NonNegative = 1.0
-    lane: NonNegative = 0.5
-    speed: NonNegative = 0.5
-    effort: NonNegative = 0.1
-    comfort: NonNegative = 0.05
-    conflict: NonNegative = 0.1
-    failure: NonNegative = 50.0
+    progress: Weight = 1.0
+    lane: Weight = 0.5
+    speed: Weight = 0.5
+    effort: Weight = 0.1
+    comfort: Weight = 0.05
+    conflict: Weight = 0.1
+    failure: Weight = 50.0
 
 
 def critical_speed(vehicle: VehicleParameters) -> float:
@@ -232,6 +257,7 @@ class TaskParameters(NamedTuple):
         lane_width: width of a lane [m]; spec of the cases (4 m).
         road_low: right edge of the road in the road frame [m].
         road_high: left edge of the road in the road frame [m].
+        road_end: path length at which the road ends, and with it the episode [m].
         y_target: lateral position of the lane to keep [m].
         target_speed: speed to drive where no slower vehicle precedes [m/s]; Case 1 (15 m/s).
         y_goal: lateral position of the lane to change to [m].
@@ -240,12 +266,13 @@ class TaskParameters(NamedTuple):
     """
 
     dt: Positive = 0.05
-    tau_p: Positive = 0.5
+    tau_p: Annotated[float, Interval(ge=1e-3, le=10.0)] = 0.5
     lane_width: Positive = 4.0
     road_low: float = -2.0
     road_high: float = 6.0
+    road_end: Positive = math.inf
     y_target: float = 0.0
-    target_speed: Positive = 15.0
+    target_speed: TargetSpeed = 15.0
     y_goal: float = 0.0
     change_onset: NonNegative = math.inf
     change_duration: Positive = 4.0

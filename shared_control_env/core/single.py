@@ -199,6 +199,12 @@ def note_start(scene: Record, parameters: Record, memory: Record, info_record: R
 
 
 @jit
+def has_run_out(scene: Record, steps: int, parameters: Record) -> bool:
+    """:func:`closed_loop.has_run_out`."""
+    return closed_loop.has_run_out(scene[()], steps, parameters[()])
+
+
+@jit
 def conclude(
     previous_s: float,
     last_a: float,

@@ -10,10 +10,33 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from shared_control_env.envs.scenarios import CurveEnv, TwoLaneEnv
+    from shared_control_env.envs.scenarios import (
+        BendEnv,
+        CurveEnv,
+        CurveWithLeadEnv,
+        CutInEnv,
+        DenseTrafficEnv,
+        LaneChangeEnv,
+        LaneKeepingEnv,
+        LeadBrakingEnv,
+        SCurveEnv,
+        TwoLaneEnv,
+    )
     from shared_control_env.envs.shared_control import SharedControlEnv
 
-__all__ = ["CurveEnv", "SharedControlEnv", "TwoLaneEnv"]
+__all__ = [
+    "BendEnv",
+    "CurveEnv",
+    "CurveWithLeadEnv",
+    "CutInEnv",
+    "DenseTrafficEnv",
+    "LaneChangeEnv",
+    "LaneKeepingEnv",
+    "LeadBrakingEnv",
+    "SCurveEnv",
+    "SharedControlEnv",
+    "TwoLaneEnv",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.action import ActionType
 
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, checked_slot, space_of
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, Clipping, checked_slot, space_of
 from shared_control_env.envs.vehicles import EgoVehicle
 
 if TYPE_CHECKING:
@@ -19,6 +20,10 @@ class SlotAction(ActionType):
     """Action of the bare environment, a dict of both slots."""
 
     env: SharedControlEnv
+
+    def __init__(self, env: SharedControlEnv) -> None:
+        super().__init__(env)
+        self._clipping = Clipping()
 
     def space(self) -> spaces.Space:
         """Dict with a Box for each slot."""
@@ -41,11 +46,11 @@ class SlotAction(ActionType):
         Raises:
             ValueError: if a slot is missing, unknown, of the wrong shape or not finite.
         """
-        if not isinstance(action, dict) or set(action) != set(SLOT_SPACES):
+        if not isinstance(action, Mapping) or set(action) != set(SLOT_SPACES):
             raise ValueError(
                 f"action = {action!r} must be a dict with the keys {sorted(SLOT_SPACES)}; the wrappers "
                 "AuthorityLimiter and DriverModel bind one each"
             )
-        command = checked_slot(DRIVER, action[DRIVER])
+        command = checked_slot(DRIVER, action[DRIVER], self._clipping)
         command *= self.env.command_limits
-        return command, float(checked_slot(AUTHORITY, action[AUTHORITY])[0])
+        return command, float(checked_slot(AUTHORITY, action[AUTHORITY], self._clipping)[0])

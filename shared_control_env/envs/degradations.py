@@ -10,6 +10,9 @@ from shared_control_env.core.parameters import Limits
 
 Range = tuple[float, float]
 
+NOISES = ("white_noise", "coloured_noise")
+"""Kinds of degradation that draw numbers, and whose size is a standard deviation."""
+
 
 class Degradation(NamedTuple):
     """A degradation to draw: uniform within its ranges, one channel of those named, with one seed for its noise.
@@ -106,8 +109,9 @@ def draw_degradation(name: str, limits: Limits, rng: np.random.Generator) -> lis
         "onset": _between(entry.onset, onset),
         "ramp": _between(entry.ramp, ramp),
         "period": _between(entry.period, period),
-        "seed": seed,
     }
+    if entry.kind in NOISES:
+        fault["seed"] = seed
     if entry.size is not None:
         bound = limits.a_max if channel == "acceleration" else limits.delta_max
         fault["size"] = _between(entry.size, size) * (bound if entry.of_limit else 1.0)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.core.parameters import Limits
-from shared_control_env.envs.config import NOISES, RandomSettings, Settings, check, plain
-from shared_control_env.envs.degradations import draw_degradation
+from shared_control_env.envs.degradations import NOISES, draw_degradation
+from shared_control_env.envs.settings import RandomSettings, Settings, check, plain
 
 
 def is_random(settings: Settings) -> bool:
@@ -34,32 +34,34 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
         return settings
     config = plain(settings)
     for entry in settings.randomise:
-        _assign(config, entry, _value(entry, rng))
+        _draw_setting(config, entry, rng)
+    drawn: list[dict[str, Any]] = []
     if settings.degradations:
         name = settings.degradations[int(rng.integers(len(settings.degradations)))]
-        config["faults"] += draw_degradation(name, Limits(**config["limits"]), rng)
-    config["randomise"], config["degradations"] = [], []
+        drawn = draw_degradation(name, Limits(**config["limits"]), rng)
     for fault in config["faults"]:
-        if fault.get("seed") is None:
-            fault["seed"] = int(rng.integers(2**31))
+        if fault["seed"] is None:
+            seed = int(rng.integers(2**31))  # for every kind, so that the next draws do not depend on this one's kind
+            if fault["kind"] in NOISES:
+                fault["seed"] = seed
+    config["faults"] += drawn
+    config["randomise"], config["degradations"] = [], []
     return check(config)
 
 
-def _value(entry: RandomSettings, rng: np.random.Generator) -> float:
-    if entry.choices is not None:
-        return entry.choices[int(rng.integers(len(entry.choices)))]
-    assert entry.low is not None
-    assert entry.high is not None  # as checked with the settings
-    return float(rng.uniform(entry.low, entry.high))
-
-
-def _assign(config: dict[str, Any], entry: RandomSettings, value: float) -> None:
-    """Set the setting that an entry names."""
+def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.Generator) -> None:
+    """Draw one setting of a plain dict; whole numbers, both ends included, where it is a whole number."""
     *path, last = entry.setting.split(".")
     section: Any = config
     for key in path:
         section = section[int(key)] if isinstance(section, list) else section[key]
-    if isinstance(section, list):
-        section[int(last)] = value
+    place: Any = int(last) if isinstance(section, list) else last
+    if entry.choices is not None:
+        section[place] = entry.choices[int(rng.integers(len(entry.choices)))]
+        return
+    assert entry.low is not None
+    assert entry.high is not None  # as checked with the settings
+    if isinstance(section[place], int):
+        section[place] = int(rng.integers(int(entry.low), int(entry.high), endpoint=True))
     else:
-        section[last] = value
+        section[place] = float(rng.uniform(entry.low, entry.high))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
 
 import numpy as np
 import pygame
@@ -11,18 +12,23 @@ from highway_env.road.graphics import RoadGraphics, WorldSurface
 
 from shared_control_env.core.road import point_at
 from shared_control_env.core.safe_area import REACHED
+from shared_control_env.envs.settings.schema import PANEL_HEIGHT
 
 if TYPE_CHECKING:
     from shared_control_env.envs.shared_control import SharedControlEnv
 
-PANEL_HEIGHT = 192
-"""Height of the gauges' panel under the road [px]."""
+_SHAPE = ("screen_width", "screen_height", "centering_position", "scaling", "offscreen_rendering")
+"""Settings that a viewer is made for."""
 
 BACKGROUND, INK, FAINT = (250, 250, 250), (30, 30, 30), (205, 205, 205)
 AUTOMATION, DEGRADED, LIMITED, DRIVER = (0, 110, 200), (215, 45, 45), (150, 90, 200), (20, 140, 60)
 SAFE, BLOCKED = (70, 200, 120, 70), (230, 150, 40, 90)
 PREDICTION, PATH = (0, 230, 60), (255, 210, 0)
 RISK, AUTHORITY = (220, 110, 0), (90, 60, 190)
+
+
+_WINDOWS: WeakSet[SharedControlViewer] = WeakSet()
+"""Viewers that draw on pygame's window."""
 
 
 class SharedControlViewer(EnvViewer):
@@ -34,7 +40,7 @@ class SharedControlViewer(EnvViewer):
 
     def __init__(self, env: SharedControlEnv) -> None:
         # The parent's constructor opens a display even where it only draws on surfaces, so it is not called.
-        self.env, self.config = env, env.config
+        self.env, self.config = env, {name: env.config[name] for name in _SHAPE}
         self.offscreen = self.config["offscreen_rendering"]
         self.observer_vehicle = None
         size = (self.config["screen_width"], self.config["screen_height"])
@@ -42,6 +48,7 @@ class SharedControlViewer(EnvViewer):
             pygame.display.init()
             pygame.display.set_caption("shared_control_env")
             self.screen = pygame.display.set_mode(size)
+            _WINDOWS.add(self)
         pygame.font.init()
         self.font = pygame.font.Font(None, 20)
         self.clock = pygame.time.Clock()
@@ -57,8 +64,8 @@ class SharedControlViewer(EnvViewer):
         self._draw_panel()
         if not self.offscreen:
             self.screen.blit(self.frame_surface, (0, 0))
-            if self.env.config["real_time_rendering"]:
-                self.clock.tick(self.env.config["policy_frequency"])
+            if self.env.episode.real_time_rendering:
+                self.clock.tick(self.env.episode.policy_frequency)
             pygame.display.flip()
 
     def get_image(self) -> np.ndarray:
@@ -66,9 +73,14 @@ class SharedControlViewer(EnvViewer):
         return np.ascontiguousarray(np.moveaxis(pygame.surfarray.array3d(self.frame_surface), 0, 1))
 
     def close(self) -> None:
-        """Close the window; other environments' viewers stay alive."""
-        if not self.offscreen:
+        """Close the window, which pygame has one of: it stays as long as another environment draws on it."""
+        _WINDOWS.discard(self)
+        if not self.offscreen and not _WINDOWS:
             pygame.display.quit()
+
+    def shows(self, config: dict[str, Any]) -> bool:
+        """Whether this viewer is one for a configuration."""
+        return all(config[name] == value for name, value in self.config.items())
 
     def _draw_world(self) -> None:
         surface, env = self.sim_surface, self.env
@@ -78,7 +90,7 @@ class SharedControlViewer(EnvViewer):
         if len(env.path) > 1:
             pygame.draw.lines(surface, PATH, False, [surface.vec2pix(point) for point in env.path], 2)
         RoadGraphics.display_traffic(
-            env.road, surface, simulation_frequency=env.config["simulation_frequency"], offscreen=True
+            env.road, surface, simulation_frequency=env.episode.simulation_frequency, offscreen=True
         )
         self._draw_prediction()
         self.frame_surface.blit(pygame.transform.flip(surface, False, True), (0, 0))
@@ -112,7 +124,7 @@ class SharedControlViewer(EnvViewer):
         pygame.draw.rect(self.frame_surface, BACKGROUND, (0, top, width, PANEL_HEIGHT))
         self._write(
             f"t = {env.scene['t']:.2f} s     v = {env.vehicle.speed:.1f} m/s     "
-            f"y = {env.scene['z'][1] - env.scene['y_target']:+.2f} m     law: {env.settings.authority.law}     "
+            f"y = {env.scene['z'][1] - env.scene['y_target']:+.2f} m     law: {env.episode.authority.law}     "
             f"fault: {'active' if noted['fault_active'] else 'none'}",
             (14, top + 10),
         )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from shared_control_env.envs.cases import CASES, CURVE, TWO_LANE, Case
-from shared_control_env.envs.config import merge
+from shared_control_env.envs import cases
+from shared_control_env.envs.cases import CASES, Case
+from shared_control_env.envs.settings import merge
 from shared_control_env.envs.shared_control import SharedControlEnv
 
 
@@ -27,16 +28,69 @@ class ScenarioEnv(SharedControlEnv):
 class TwoLaneEnv(ScenarioEnv):
     """Case 1: lane keeping behind a slower vehicle on a straight two-lane road; the steering degrades."""
 
-    case = TWO_LANE
+    case = cases.TWO_LANE
 
 
 class CurveEnv(ScenarioEnv):
     """Case 2: following a vehicle round a curve of 60 m radius; the acceleration degrades."""
 
-    case = CURVE
+    case = cases.CURVE
+
+
+class LaneKeepingEnv(ScenarioEnv):
+    """Straight road, two lanes: keep the lane behind a slower vehicle, with others beside."""
+
+    case = cases.LANE_KEEPING
+
+
+class BendEnv(ScenarioEnv):
+    """A curve to either side, free road."""
+
+    case = cases.BEND
+
+
+class SCurveEnv(ScenarioEnv):
+    """Two arcs one after the other, free road."""
+
+    case = cases.S_CURVE
+
+
+class LaneChangeEnv(ScenarioEnv):
+    """Change to the left lane past a slower vehicle, in traffic."""
+
+    case = cases.LANE_CHANGE
+
+
+class CutInEnv(ScenarioEnv):
+    """A vehicle from the left lane cuts in."""
+
+    case = cases.CUT_IN
+
+
+class LeadBrakingEnv(ScenarioEnv):
+    """The vehicle ahead brakes to a stop."""
+
+    case = cases.LEAD_BRAKING
+
+
+class DenseTrafficEnv(ScenarioEnv):
+    """Eight vehicles that follow one another and the ego."""
+
+    case = cases.DENSE_TRAFFIC
+
+
+class CurveWithLeadEnv(ScenarioEnv):
+    """A curve to either side behind a vehicle."""
+
+    case = cases.CURVE_WITH_LEAD
+
+
+_CLASSES: tuple[type[ScenarioEnv], ...] = (
+    *(TwoLaneEnv, CurveEnv, LaneKeepingEnv, BendEnv, SCurveEnv, LaneChangeEnv, CutInEnv, LeadBrakingEnv),
+    *(DenseTrafficEnv, CurveWithLeadEnv),
+)
 
 
 def scenario(name: str) -> type[ScenarioEnv]:
     """Class of the bare environment of a scenario, by its key in :data:`cases.CASES`."""
-    written_out = {"two_lane": TwoLaneEnv, "curve": CurveEnv}
-    return written_out.get(name) or type(f"{name}_env", (ScenarioEnv,), {"case": CASES[name]})
+    return next(each for each in _CLASSES if each.case is CASES[name])

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from highway_env import utils
-from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.vehicle.graphics import VehicleGraphics
 
-from shared_control_env.controllers.automation import Automation
+from shared_control_env.controllers.automation import Automation, Planner
 from shared_control_env.core import delaunay, single
 from shared_control_env.core.info import INFO, as_dict
 from shared_control_env.core.records import FAULT_MEMORY, HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
 from shared_control_env.core.reward import TERMS
 from shared_control_env.core.safe_area import triangulate
-from shared_control_env.envs import config as configuration
+from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.action import SlotAction
 from shared_control_env.envs.episode import draw_episode
 from shared_control_env.envs.graphics import SharedControlViewer
+from shared_control_env.envs.inherited import HighwayEnv
 from shared_control_env.envs.observation import DriverObservation
 from shared_control_env.envs.roads import LineRoad
+from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.situation import Situation, start_of
-from shared_control_env.envs.vehicles import EgoVehicle, LaneFollower
+from shared_control_env.envs.vehicles import EgoVehicle, LaneFollower, vehicle_class
 
 
-class SharedControlEnv(AbstractEnv):
+class SharedControlEnv(HighwayEnv):
     """Human-machine shared control of one car whose automation degrades.
 
     A step runs the signals of one time step k: the automation's desired command u_a,des and its degraded
@@ -40,15 +41,19 @@ class SharedControlEnv(AbstractEnv):
     The bare environment's action has both slots open (:class:`SlotAction`); the wrappers ``AuthorityLimiter`` and
     ``DriverModel`` bind them.
 
+    A subclass may override ``_reward(action)``, ``_rewards(action)``, ``_is_terminated()``, ``_is_truncated()`` and
+    ``_info(observation, action)``, as those of highway-env.
+
     Attributes:
-        settings: checked settings; ``config`` is the same as a plain dict.
+        config: settings of the next episode as a plain dict. What is assigned to it counts from the next reset on, as
+            with highway-env, and is checked there.
+        settings: the same, checked.
         episode: settings of the present episode, with all that is random drawn.
         parameters: record of :class:`Parameters` that the core runs with.
         scene: record of :data:`records.SCENE`, the present scene with its safe area.
         signals: record of :data:`records.SIGNALS`: planned for the present scene after a reset or step.
         memory: record of :data:`records.MEMORY`.
         command_limits: largest acceleration and steering [m/s^2, rad], shape (2,).
-        automation: any object with ``reset()`` and ``act(scene) -> Solution``.
         observation: the last observation.
         noted: record of :data:`info.INFO` of the last step, or reset.
     """
@@ -64,7 +69,10 @@ class SharedControlEnv(AbstractEnv):
         self.signals = np.zeros((), SIGNALS)
         self.memory = np.zeros((), MEMORY)
         self.noted = np.zeros((), INFO)
+        self.viewer: SharedControlViewer | None = None
         self._triangulation = np.zeros((), delaunay.WORKSPACE)
+        self._given_automation: Planner | None = None
+        self._adopted: dict[str, Any] | None = None
         super().__init__(config=config, render_mode=render_mode)
 
     @classmethod
@@ -73,27 +81,34 @@ class SharedControlEnv(AbstractEnv):
         return configuration.plain(configuration.Settings())
 
     def configure(self, config: dict[str, Any] | None) -> None:
-        """Merge changes into the config, nested dicts included, and check the whole.
+        """Merge changes into the config, nested dicts included, and check the whole; they act from the next reset on.
+
+        What the changes name is no longer drawn (``config["randomise"]``).
 
         Raises:
             ValueError: naming the key and the nearest valid one, or the field, its value and its range.
         """
-        merged = configuration.merge(self.config, config or {})
+        adopted = self.config if self._adopted is None else self._adopted
+        assigned = configuration.difference(adopted, self.config)
+        merged = configuration.change(adopted, assigned) if assigned else adopted
+        merged = configuration.change(merged, config or {})
         if merged["offscreen_rendering"] is None:
             merged["offscreen_rendering"] = self.render_mode != "human"
-        self.settings = configuration.check(merged)
-        self._vehicle_class = self._checked_vehicle_class()
-        self.config = configuration.plain(self.settings)
+        settings = configuration.check(merged)
+        self._check_video_speed(settings)
+        self._vehicle_class = vehicle_class(settings.other_vehicles_type)
+        self.settings = settings
+        self.config, self._adopted = configuration.plain(settings), configuration.plain(settings)
 
-    def _checked_vehicle_class(self) -> Any:
-        path = self.settings.other_vehicles_type
-        try:
-            return utils.class_from_path(path)
-        except (ValueError, ImportError, AttributeError) as error:
+    def _check_video_speed(self, settings: configuration.Settings) -> None:
+        """Refuse another frame rate where whoever records pictures was told one and cannot be told another."""
+        told = self._adopted is not None and self.render_mode == "rgb_array" and self._record_video_wrapper is None
+        if told and settings.policy_frequency != self.settings.policy_frequency:
             raise ValueError(
-                f"config['other_vehicles_type'] = {path!r} is not the path of a class, such as "
-                f"{configuration.Settings().other_vehicles_type!r} ({error})"
-            ) from None
+                f"config['policy_frequency'] = {settings.policy_frequency} Hz: pictures of this environment are taken "
+                f"at {self.settings.policy_frequency} Hz, which a video's recorder cannot be told to change; make a new "
+                "environment, or hand the recorder to set_record_video_wrapper()"
+            )
 
     def define_spaces(self) -> None:
         """Build action and observation types once: new spaces would forget the user's seed."""
@@ -104,8 +119,26 @@ class SharedControlEnv(AbstractEnv):
             self.action_space = self.action_type.space()
 
     def update_metadata(self, video_real_time_ratio: float = 1.0) -> None:
-        """One frame a decision: videos run at the speed of the drive."""
-        self.metadata["render_fps"] = round(video_real_time_ratio * self.settings.policy_frequency)
+        """Frame rate at which videos run at the speed of the drive: of decisions, or of simulation steps if recorded."""
+        frequency = self.settings.policy_frequency
+        if self._record_video_wrapper is not None:
+            frequency = self.settings.simulation_frequency
+            self._record_video_wrapper.frames_per_sec = round(video_real_time_ratio * frequency)
+        self.metadata["render_fps"] = round(video_real_time_ratio * frequency)
+
+    @property
+    def automation(self) -> Planner:
+        """Who decides u_a,des: the predictive controller of Eq. 12-13, or another :class:`Planner` put here.
+
+        One that is put here stays over resets, which call its ``reset()``.
+        """
+        return self._automation
+
+    @automation.setter
+    def automation(self, automation: Planner) -> None:
+        if isinstance(automation, type) or not isinstance(automation, Planner):
+            raise ValueError(f"automation = {automation!r} must be an object with reset() and act(scene) -> Solution")
+        self._automation = self._given_automation = automation
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -122,20 +155,26 @@ class SharedControlEnv(AbstractEnv):
         Raises:
             ValueError: for unknown options or wrong settings.
         """
-        if options is not None and not isinstance(options, dict):
+        if options is not None and not isinstance(options, Mapping):
             raise ValueError(f"options = {options!r} must be a dict")
         unknown = set(options or {}) - {"config"}
         if unknown:
-            raise ValueError(f"options has the unknown key(s) {sorted(unknown)}; valid is 'config'")
-        if options and "config" in options:
-            self.configure(options["config"])
-        gym.Env.reset(self, seed=seed)
+            raise ValueError(f"options has the unknown key(s) {sorted(map(str, unknown))}; valid is 'config'")
+        changes = (options or {}).get("config")
+        if changes is not None or self.config != self._adopted:
+            self.configure(changes)
+        gym.Env.reset(self, seed=checked_seed(seed))
         self.update_metadata()
-        self.steps, self.done = 0, False
+        self.steps, self.time, self.done = 0, 0.0, False
         self._reset()
+        if self.viewer is not None and not self.viewer.shows(self.config):
+            self.viewer.close()
+            self.viewer = None
         self._perceive_and_plan()
         self.observation = self.observation_type.observe()
-        info = self._info()
+        self.noted = self._note_signals()
+        single.note_start(self.scene, self.parameters, self.memory, self.noted)
+        info = self._info(self.observation)
         if self.render_mode == "human":
             self.render()
         return self.observation.copy(), info
@@ -159,9 +198,10 @@ class SharedControlEnv(AbstractEnv):
         self.road.update_rows()
         self._corners = np.zeros((len(self.traffic), 4, 2))
         self._terms = np.zeros(len(TERMS))
+        self.episode_steps = settings.steps
         self._path = np.zeros((settings.steps + 1, 2))
-        self.automation = Automation(self.parameters)
-        self.automation.reset()
+        self._automation = self._given_automation or Automation(self.parameters)
+        self._automation.reset()
         single.clear_memory(self.memory)
         single.clear_signals(self.signals)
 
@@ -189,12 +229,26 @@ class SharedControlEnv(AbstractEnv):
             start, end, low, high = scene["region"].tolist()
             single.search(triangulate(start, end, low, high, self._corners[:count]), p, scene)
         y, v_target = single.misjudge(scene, self.faults, p, signals)
-        self.solution = self.automation.act(scene)
-        single.judge_rightly(scene, y, v_target)
-        signals["u_a_des"] = self.solution.command
+        try:
+            self.solution = self._automation.act(scene)
+        finally:
+            single.judge_rightly(scene, y, v_target)
+        signals["u_a_des"] = self._desired()
         signals["status"], signals["iterations"] = self.solution.status, self.solution.iterations
         signals["residual"] = self.solution.dual_residual
         single.monitor(scene, self.traffic, self.line, self.faults, self._fault_memories, p, signals)
+
+    def _desired(self) -> np.ndarray:
+        """The automation's command; one of another automation is checked, and kept within the limits."""
+        command = self.solution.command
+        if self._given_automation is None:
+            return command
+        command = np.asarray(command, dtype=float)
+        if command.shape != (2,) or not np.isfinite(command).all():
+            raise ValueError(
+                f"automation.act() gave the command {command!r}; it must be finite [a, delta] [m/s^2, rad], shape (2,)"
+            )
+        return np.clip(command, -self.command_limits, self.command_limits)
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Drive one time step.
@@ -211,10 +265,10 @@ class SharedControlEnv(AbstractEnv):
         command, alpha_a = self.action_type.decode(action)
         last_a, previous_s = float(self.memory["u"][0]), float(self.scene["z"][0])
         single.blend(command, alpha_a, self.parameters, self.scene, self.memory, self.signals)
-        info = self.noted = self._note_signals()
+        self.noted = self._note_signals()
         self._simulate(self.signals["u"])
         self._perceive_and_plan()
-        reward, terminated = single.conclude(
+        self._outcome = single.conclude(
             previous_s,
             last_a,
             bool(self.vehicle.crashed),
@@ -223,37 +277,70 @@ class SharedControlEnv(AbstractEnv):
             self.parameters,
             self.memory,
             self._terms,
-            info,
+            self.noted,
         )
         self.observation = self.observation_type.observe()
+        reward, terminated, truncated = self._reward(action), self._is_terminated(), self._is_truncated()
+        info = self._info(self.observation, action)
         if self.render_mode == "human":
             self.render()
-        return self.observation.copy(), reward, terminated, self._is_truncated(), as_dict(info)
+        return self.observation.copy(), reward, terminated, truncated, info
 
     def _simulate(self, u: np.ndarray) -> None:
         """Move all vehicles through one decision's simulation steps under a constant command."""
         self.vehicle.act({"acceleration": float(u[0]), "steering": float(u[1])})
-        frames = self.settings.simulation_frequency // self.settings.policy_frequency
-        for _ in range(frames):
+        frames = self.episode.simulation_frequency // self.episode.policy_frequency
+        for frame in range(frames):
             self.road.act()
-            self.road.step(1.0 / self.settings.simulation_frequency)
+            self.road.step(1.0 / self.episode.simulation_frequency)
+            if self._record_video_wrapper is not None and self._record_video_wrapper.recording and frame + 1 < frames:
+                self._record_video_wrapper._capture_frame()
         self.steps += 1
+        self.time = self.steps / self.episode.policy_frequency
+
+    def _reward(self, action: Any) -> float:
+        """Reward of the step just taken: the weighted terms of :mod:`core.reward`."""
+        return self._outcome[0]
+
+    def _rewards(self, action: Any) -> dict[str, float]:
+        """The unweighted terms of the step just taken, by name."""
+        return as_dict(self.noted["rewards"])
+
+    def _is_terminated(self) -> bool:
+        """Whether the step just taken ended in a collision or off the road."""
+        return self._outcome[1]
 
     def _is_truncated(self) -> bool:
-        """End of the duration, counted in whole steps."""
-        return self.steps >= self.settings.steps
+        """End of the duration, counted in whole steps, or of the road."""
+        return single.has_run_out(self.scene, self.episode_steps, self.parameters)
 
     def _note_signals(self) -> np.ndarray:
         """A new record of info that holds the signals of the present time step."""
         info = np.zeros((), INFO)
-        single.note_signals(self.scene, self.signals, self.faults, self.automation.failures, info)
+        failures = int(getattr(self._automation, "failures", 0))
+        single.note_signals(self.scene, self.signals, self.faults, failures, info)
         return info
 
-    def _info(self, obs: Any = None, action: Any = None) -> dict[str, Any]:
-        """Info of a reset; highway-env's own also carries an unseeded sample of the action, which is left out."""
-        info = self.noted = self._note_signals()
-        single.note_start(self.scene, self.parameters, self.memory, info)
-        return as_dict(info)
+    def _info(self, obs: np.ndarray, action: Any = None) -> dict[str, Any]:
+        """Every signal of the step just taken, or of the reset (:data:`core.info.INFO`).
+
+        highway-env's own also carries the action, which is an unseeded sample at a reset; it is left out.
+        """
+        info = as_dict(self.noted)
+        if type(self)._rewards is not SharedControlEnv._rewards:
+            info["rewards"] = self._rewards(action)
+        return info
+
+    def action_of(self, command: Any) -> np.ndarray:
+        """The action for a driver's command, which ``step`` takes in shares of the limits.
+
+        Args:
+            command: ``[a, delta]`` [m/s^2, rad], shape (2,).
+
+        Returns:
+            float32, shape (2,); beyond [-1, 1] where the command is beyond the limits.
+        """
+        return (np.asarray(command, dtype=float) / self.command_limits).astype(np.float32)
 
     @property
     def traffic(self) -> np.ndarray:
@@ -297,6 +384,11 @@ class SharedControlEnv(AbstractEnv):
             self.viewer = SharedControlViewer(self)
         self.viewer.display()
         if self.render_mode == "human":
-            self.viewer.handle_events()
+            if not self.viewer.offscreen:
+                self.viewer.handle_events()
             return None
         return self.viewer.get_image()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State for pickles: all but windows and recorders, which belong to this process."""
+        return {**self.__dict__, "viewer": None, "_record_video_wrapper": None}

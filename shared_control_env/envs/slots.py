@@ -6,7 +6,7 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from gymnasium import spaces
+from gymnasium import logger, spaces
 
 DRIVER, AUTHORITY = "driver", "authority"
 """Names of the slots."""
@@ -30,20 +30,68 @@ def space_of(slots: tuple[str, ...]) -> spaces.Space:
     return spaces.Dict(boxes) if len(boxes) > 1 else boxes[slots[0]]
 
 
-def checked_slot(slot: str, value: Any) -> np.ndarray:
+class Clipping:
+    """Warns once of values that are beyond their bounds step after step, since they are in another unit, perhaps.
+
+    Args:
+        num_envs: of how many environments.
+    """
+
+    PATIENCE = 20
+    """Steps in a row after which it is told."""
+
+    def __init__(self, num_envs: int = 1) -> None:
+        self._steps = {slot: np.zeros(num_envs, dtype=int) for slot in SLOT_SPACES}
+        self._in_a_row = dict.fromkeys(SLOT_SPACES, False)
+        self._told = False
+
+    def note(self, slot: str, values: np.ndarray, beyond: bool) -> None:
+        """Note the values of one step.
+
+        Args:
+            slot: name of the slot.
+            values: shape (num_envs, size).
+            beyond: whether any of them is beyond its bounds.
+        """
+        if not beyond:
+            if self._in_a_row[slot]:
+                self._steps[slot][:] = 0
+                self._in_a_row[slot] = False
+            return
+        low, high, _ = _BOUNDS[slot]
+        steps = self._steps[slot]
+        steps += 1
+        steps[((values >= low) & (values <= high)).all(axis=1)] = 0
+        self._in_a_row[slot] = True
+        if not self._told and steps.max() >= self.PATIENCE:
+            self._told = True
+            logger.warn(
+                f"action[{slot!r}] has been beyond [{low:g}, {high:g}] and clipped for {self.PATIENCE} steps in a row. "
+                "Actions are shares of the limits, as action_space says; a command in m/s^2 and rad becomes one by "
+                "env.unwrapped.action_of(command), or drives through wrappers.DriverModel."
+            )
+
+
+def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
     """A slot's value as an array within its bounds.
 
+    Args:
+        slot: name of the slot.
+        value: numbers of the slot's shape.
+        clipping: told of values beyond the bounds, which are clipped, as highway-env's ContinuousAction does.
+
     Raises:
-        ValueError: if the shape is wrong or an entry is not finite. Values beyond the bounds are clipped, as
-            highway-env's ContinuousAction does.
+        ValueError: if the shape is wrong or an entry is not finite.
     """
     low, high, size = _BOUNDS[slot]
     try:
         array = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         array = np.full(0, np.nan)
-    if array.shape != (size,) or not all(map(isfinite, array.tolist())):
+    values = array.tolist()
+    if array.shape != (size,) or not all(map(isfinite, values)):
         raise ValueError(
             f"action[{slot!r}] = {value!r} must be {size} finite number(s) in [{low:g}, {high:g}], shape ({size},)"
         )
+    clipping.note(slot, array[None], min(values) < low or max(values) > high)
     return array.clip(low, high, out=array)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -22,6 +25,7 @@ from shared_control_env.core.records import (
     Y,
     pack,
 )
+from shared_control_env.envs.settings import OWN_TRAFFIC
 
 
 class ArrayVehicle(Vehicle):
@@ -136,6 +140,31 @@ class LaneFollower(ArrayVehicle):
     def step(self, dt: float) -> None:
         """Advance along the lane by dt [s]."""
         single.move(self.array, self.plan, self.road.line, self.road.time, dt)
+
+
+def vehicle_class(path: str) -> type[Vehicle]:
+    """Class of the other vehicles by its path, such as ``highway_env.vehicle.behavior.IDMVehicle``.
+
+    A setting may come from a file of somebody else's, so that it imports nothing: a class is found in highway-env, in
+    this package, or in a module that the program has imported itself.
+
+    Raises:
+        ValueError: if there is no such class, or it is no vehicle of highway-env.
+    """
+    module, _, name = path.rpartition(".")
+    what = f"config['other_vehicles_type'] = {path!r}"
+    if module.split(".")[0] in ("highway_env", "shared_control_env") and find_spec(module) is not None:
+        found = getattr(import_module(module), name, None)
+    elif module in sys.modules:
+        found = getattr(sys.modules[module], name, None)
+    else:
+        raise ValueError(
+            f"{what} must be the path of a class, such as {OWN_TRAFFIC!r}; its module {module!r} is neither "
+            "highway-env's nor imported already"
+        )
+    if not isinstance(found, type) or not issubclass(found, Vehicle):
+        raise ValueError(f"{what} must be the path of a class of vehicles, such as {OWN_TRAFFIC!r}; it is {found!r}")
+    return found
 
 
 def write_row(vehicle: Vehicle, row: np.ndarray) -> None:

@@ -15,6 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from shared_control_env.core.delaunay import MAX_HOLES
 from shared_control_env.core.info import INFO
+from shared_control_env.core.jit import is_interpreted
 from shared_control_env.core.observation import FEATURES
 from shared_control_env.core.records import (
     AUTOMATION_MEMORY,
@@ -23,11 +24,12 @@ from shared_control_env.core.records import (
     SCENE,
     SIGNALS,
 )
-from shared_control_env.envs import config as configuration
+from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.cases import CASES, Case
-from shared_control_env.envs.config import Settings, plain
 from shared_control_env.envs.episode import draw_episode, is_random
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, space_of
+from shared_control_env.envs.seeds import checked_seed
+from shared_control_env.envs.settings import OWN_TRAFFIC, Settings, plain
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, Clipping, space_of
 from shared_control_env.vector import cold_start, kernel
 from shared_control_env.vector.records import (
     NOT_LOADED,
@@ -38,11 +40,8 @@ from shared_control_env.vector.records import (
     Outputs,
     Setup,
 )
-from shared_control_env.vector.starts import empty_starts, sizes_for, write_start
+from shared_control_env.vector.starts import empty_starts, grown, sizes_for, write_start
 from shared_control_env.vector.threads import Threads, cores
-
-KERNEL_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
-"""Traffic that the kernel knows."""
 
 ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_vehicles_type")
 """Settings that all environments share."""
@@ -118,23 +117,25 @@ class SharedControlVectorEnv(VectorEnv):
         if threads is not None and (not _is_integer(threads) or threads < 1):
             raise ValueError(f"threads = {threads!r} must be an integer of at least 1, or None for one a core")
         for name, value in (("limiter", limiter), ("driver", driver)):
-            if not isinstance(value, bool):
+            if not isinstance(value, bool | np.bool_):
                 raise ValueError(
                     f"{name} = {value!r} must be True or False; for a driver of your own use DriverModel on the single "
                     "environment, or its commands as actions"
                 )
-        names = {mode.name.lower(): mode for mode in AutoresetMode}
-        if not isinstance(autoreset_mode, AutoresetMode) and autoreset_mode not in names:
-            raise ValueError(f"autoreset_mode = {autoreset_mode!r} must be an AutoresetMode or one of {sorted(names)}")
+        if is_interpreted():
+            raise ValueError(
+                "NUMBA_DISABLE_JIT is set, and the vectorised environment is compiled alone: unset it, or use gym.make "
+                "or gym.make_vec(..., vectorization_mode='sync')"
+            )
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode = {render_mode!r} must be one of {self.metadata['render_modes']} or None")
-        self._mode = autoreset_mode if isinstance(autoreset_mode, AutoresetMode) else names[autoreset_mode]
-        self.num_envs, self.render_mode = num_envs, render_mode
-        self._limiter, self._driver = limiter, driver
+        self._mode = _autoreset_mode(autoreset_mode)
+        self.num_envs, self.render_mode = int(num_envs), render_mode
+        self._limiter, self._driver = bool(limiter), bool(driver)
         self._case = case
         self._viewer_env: Any = None
         default = configuration.merge(configuration.plain(Settings()), case.settings)
-        settings = configuration.check(configuration.merge(default, config or {}))
+        settings = configuration.check(configuration.change(default, config or {}))
         _check_for_kernel(settings)
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
@@ -144,6 +145,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._programs = np.zeros(self._threads.count, PROGRAM)
         self._no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self._everyone = np.ones(num_envs, dtype=bool)
+        self._clipping = Clipping(self.num_envs)
         self._seeds: list[int | None] = [None] * num_envs
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._solvers = NOT_LOADED
@@ -153,6 +155,7 @@ class SharedControlVectorEnv(VectorEnv):
         """Spaces of the open slots, once."""
         bound = {DRIVER: self._driver, AUTHORITY: self._limiter}
         self._open = tuple(slot for slot in SLOT_SPACES if not bound[slot])
+        self._open_bounds = {slot: (SLOT_SPACES[slot].low[0], SLOT_SPACES[slot].high[0]) for slot in self._open}
         single = space_of(self._open)
         self.single_action_space = single
         self.single_observation_space = spaces.Box(-1.0, 1.0, (len(FEATURES),), dtype=np.float32)
@@ -211,8 +214,8 @@ class SharedControlVectorEnv(VectorEnv):
 
     @property
     def config(self) -> dict[str, Any]:
-        """The settings of all environments, without what a list of :meth:`reset` changed in some."""
-        return configuration.plain(self._settings)
+        """The settings of all environments, without what a list of :meth:`reset` changed in some; read only."""
+        return configuration.ReadOnly(configuration.plain(self._settings))
 
     @property
     def scenes(self) -> np.ndarray:
@@ -268,13 +271,15 @@ class SharedControlVectorEnv(VectorEnv):
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_open()
-        if options is not None and not isinstance(options, dict):
+        if options is not None and not isinstance(options, Mapping):
             raise ValueError(f"options = {options!r} must be a dict")
         options = dict(options or {})
         mask = self._checked_mask(options.pop("reset_mask", None))
         config = options.pop("config", None)
         if options:
-            raise ValueError(f"options has the unknown key(s) {sorted(options)}; valid are 'config' and 'reset_mask'")
+            raise ValueError(
+                f"options has the unknown key(s) {sorted(map(str, options))}; valid are 'config' and 'reset_mask'"
+            )
         if config is not None and not mask.all():
             raise ValueError("options['config'] changes all environments; it does not go with a partial 'reset_mask'")
         changed = None if config is None else self._changed(config)
@@ -436,6 +441,35 @@ class SharedControlVectorEnv(VectorEnv):
                 raise ValueError(f"options['config'][{i}]['vehicles'] must have as many entries as in all")
         return settings, templates
 
+    def set_config(self, config: dict[str, Any] | Sequence[dict[str, Any]]) -> None:
+        """Change settings of the episodes that begin from now on, as a curriculum does; those under way go on.
+
+        Args:
+            config: changes to the settings of all environments, or a list of such for each.
+
+        Raises:
+            ValueError: for wrong settings, or those that all environments share and that need a :meth:`reset`.
+        """
+        settings, templates = self._changed(config)
+        for name in ONE_FOR_ALL:
+            if getattr(settings, name) != getattr(self._settings, name):
+                raise ValueError(
+                    f"config[{name!r}] = {getattr(settings, name)!r} is shared by all environments, some of which are "
+                    "in the middle of an episode; change it by reset(options={'config': ...})"
+                )
+        if len(settings.vehicles) != len(self._settings.vehicles):
+            raise ValueError(
+                f"config['vehicles'] has {len(settings.vehicles)} entries, and {len(self._settings.vehicles)} now; "
+                "their number is changed by reset(options={'config': ...})"
+            )
+        if not self._started:
+            self._adopt(settings, templates)
+            return
+        self._settings, self._templates, self._random = settings, templates, True
+        sizes = sizes_for(templates)
+        self._batch = grown(self._batch, sizes)
+        self._setup = self._setup._replace(starts=empty_starts(0, sizes))
+
     def _load_solvers(self) -> None:
         """Have all compiled that a step runs."""
 
@@ -563,19 +597,22 @@ class SharedControlVectorEnv(VectorEnv):
             finite = np.isfinite(array)
             if not finite.all():
                 index = int(np.argwhere(~finite)[0, 0])
-                low, high = SLOT_SPACES[slot].low[0], SLOT_SPACES[slot].high[0]
+                low, high = self._open_bounds[slot]
                 raise ValueError(
                     f"action of environment {index}, slot {slot!r}, is {array[index]}; "
                     f"it must be finite, in [{low:g}, {high:g}]"
                 )
+            low, high = self._open_bounds[slot]
+            self._clipping.note(slot, array, bool(array.max() > high or array.min() < low))
             values[slot] = array
         return Actions(values[DRIVER], values[AUTHORITY])
 
     def _checked_mask(self, mask: Any) -> np.ndarray:
         if mask is None:
             return self._everyone.copy()
-        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise ValueError(f"options['reset_mask'] = {mask!r} must be a bool array of shape ({self.num_envs},)")
+        given, mask = mask, np.asarray(mask)
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise ValueError(f"options['reset_mask'] = {given!r} must be a bool array of shape ({self.num_envs},)")
         if not mask.any():
             raise ValueError("options['reset_mask'] names no environment; at least one entry must be True")
         if not self._started and not mask.all():
@@ -586,31 +623,48 @@ class SharedControlVectorEnv(VectorEnv):
         """Generator and seed of each environment, None where none is given."""
         if seed is None:
             return [None] * self.num_envs
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int | np.integer) else seed
-        if not isinstance(seeds, Sequence | np.ndarray) or len(seeds) != self.num_envs:
+        one = np.ndim(seed) == 0  # type: ignore[arg-type]
+        seeds: Any = [checked_seed(seed) + i for i in range(self.num_envs)] if one else seed  # type: ignore[operator]
+        if isinstance(seeds, str) or not hasattr(seeds, "__len__") or len(seeds) != self.num_envs:
             raise ValueError(
                 f"seed = {seed!r} must be an integer, or have one for each of {self.num_envs} environments"
             )
-        for i, value in enumerate(seeds):
-            if value is not None and (not isinstance(value, int | np.integer) or value < 0):
-                raise ValueError(f"seed of environment {i} is {value!r}; it must be an integer from 0 on, or None")
-        return [None if value is None else seeding.np_random(int(value)) for value in seeds]
+        numbers = [checked_seed(value, f"seed of environment {i}") for i, value in enumerate(seeds)]
+        return [None if number is None else seeding.np_random(number) for number in numbers]
 
 
 def _merged(settings: Settings, changes: Mapping[str, Any]) -> Settings:
     """Settings with some changes, checked."""
-    return configuration.check(configuration.merge(configuration.plain(settings), changes))
+    return configuration.check(configuration.change(configuration.plain(settings), changes))
 
 
 def _check_for_kernel(settings: Settings) -> None:
     """Raise ValueError for settings that the single environment alone has."""
-    if settings.other_vehicles_type != KERNEL_TRAFFIC:
+    if settings.other_vehicles_type != OWN_TRAFFIC:
         raise ValueError(
             f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} is not in the kernel; allowed is "
-            f"{KERNEL_TRAFFIC!r}; for others use gym.make_vec(..., vectorization_mode='sync')"
+            f"{OWN_TRAFFIC!r}; for others use gym.make_vec(..., vectorization_mode='sync')"
         )
+    for i, entry in enumerate(settings.randomise):
+        if entry.setting in ONE_FOR_ALL:
+            raise ValueError(
+                f"config['randomise'][{i}]['setting'] = {entry.setting!r} is shared by all environments of the kernel, so "
+                "that it cannot be drawn; use gym.make_vec(..., vectorization_mode='sync')"
+            )
     if len(settings.vehicles) > MAX_HOLES:
         raise ValueError(f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}")
+
+
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Gymnasium's mode by itself, its name or its value, such as ``same_step`` or ``SameStep``."""
+    if isinstance(mode, AutoresetMode):
+        return mode
+    spellings = {each.name.lower().replace("_", ""): each for each in AutoresetMode}
+    text = str(mode).lower().replace("_", "").replace("-", "")
+    if text not in spellings:
+        names = [each.name.lower() for each in AutoresetMode]
+        raise ValueError(f"autoreset_mode = {mode!r} must be an AutoresetMode or one of {sorted(names)}")
+    return spellings[text]
 
 
 def _is_integer(value: Any) -> bool:

@@ -198,7 +198,7 @@ def advance_one(
         out.rewards[i], out.terminations[i] = closed_loop.conclude(
             previous_s, last_a, batch.crashed[i], scene, signals, p, memory, work.terms, out.infos[i]
         )
-        out.truncations[i] = scene.k >= setup.steps
+        out.truncations[i] = closed_loop.has_run_out(scene, setup.steps, p)
     observe(scene, memory, batch.lines[i], p, out.observations[i])
 
 

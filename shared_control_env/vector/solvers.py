@@ -11,9 +11,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import cfunc, float64, from_dtype, int64, types
+from numba import float64, from_dtype, int64, types
+from numba.core.ccallback import CFunc
 
 from shared_control_env.core import active_set_qp, closed_loop, condensing
+from shared_control_env.core.cache import cache_of
 from shared_control_env.core.driver_qp import build_program
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, Record, record_dtype
@@ -42,8 +44,12 @@ class Solver:
     @cached_property
     def address(self) -> int:
         """Where it is in memory; it is compiled for that, or read from numba's cache."""
-        options: Any = {"cache": True, "error_model": "numpy", "_nrt": False}  # as core.jit has them
-        compiled: Any = cfunc(self._signature, **options)(self._function)
+        options: Any = {"error_model": "numpy", "_nrt": False}  # as core.jit has them
+        compiled: Any = CFunc(
+            self._function, (self._signature.args, self._signature.return_type), locals={}, options=options
+        )
+        compiled._cache = cache_of(self._function)
+        compiled.compile()
         self._compiled = compiled  # lest its code is freed
         return compiled.address
 
@@ -101,7 +107,7 @@ def drive(scene: Record, p: Parameters, memory: Record, work: Record, program: R
     status, iterations, primal, dual = active_set_qp.solve_qp(
         n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set
     )
-    if status == active_set_qp.SOLVED:
+    if status == active_set_qp.SOLVED and np.isfinite(g.x[0] + g.x[1]):
         work.command[0] = min(max(g.x[0], -1.0), 1.0) * p.limits.a_max
         work.command[1] = min(max(g.x[1], -1.0), 1.0) * p.limits.delta_max
     else:

@@ -18,7 +18,8 @@ class StableBaselinesVecEnv(VecEnv):
 
     Its ``infos`` are filled at the end of an episode: ``terminal_observation`` and ``TimeLimit.truncated``, which its
     algorithms read, and the signals of the last step. Of all other steps the signals stay arrays, in the attribute
-    ``signals``. Options of :meth:`set_options` are those of the environment: ``{"config": {...}}``.
+    ``signals``. Options of :meth:`set_options` are those of the environment, ``{"config": {...}}``; they act on every
+    episode that begins after them, by :meth:`reset` or in a step, so that a callback can make the task harder.
 
     Args:
         env: of :func:`gymnasium.make_vec`, with ``autoreset_mode="same_step"``.
@@ -64,7 +65,15 @@ class StableBaselinesVecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Step all environments; those that end are reset in the same step."""
+        """Step all environments; those that end are reset in the same step, with the options given meanwhile.
+
+        Raises:
+            ValueError: for options that cannot act before the next :meth:`reset`, such as another duration.
+        """
+        if any(self._options):
+            options = self._joint_options()
+            self._reset_options()
+            self.env.set_config(options["config"])
         observations, rewards, terminations, truncations, self.signals = self.env.step(self._actions)
         dones = terminations | truncations
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

@@ -10,7 +10,7 @@ import numpy as np
 from shared_control_env.core.parameters import DegradationParameters, Parameters, TrafficParameters
 from shared_control_env.core.records import record_dtype
 from shared_control_env.core.road import S0
-from shared_control_env.envs.config import Settings
+from shared_control_env.envs.settings import Settings
 from shared_control_env.envs.situation import start_of
 from shared_control_env.vector.records import Batch, Starts
 
@@ -56,6 +56,19 @@ def empty_starts(n: int, sizes: Sizes) -> Starts:
         traffic=np.zeros((n, sizes.vehicles, 8)),
         plans=np.zeros((n, sizes.vehicles), record_dtype(TrafficParameters)),
     )
+
+
+def grown(batch: Batch, sizes: Sizes) -> Batch:
+    """A batch with room for larger starts too; what is under way in it stays as it is."""
+    n, rows, faults = *batch.lines.shape[:2], batch.faults.shape[1]
+    if sizes.rows <= rows and sizes.faults <= faults:
+        return batch
+    larger = empty_starts(n, Sizes(max(sizes.faults, faults), max(sizes.rows, rows), sizes.vehicles))
+    larger.lines[:, :, S0] = np.inf
+    larger.lines[:, :rows], larger.faults[:, :faults] = batch.lines, batch.faults
+    memories = np.zeros(larger.faults.shape, batch.fault_memories.dtype)
+    memories[:, :faults] = batch.fault_memories
+    return batch._replace(lines=larger.lines, faults=larger.faults, fault_memories=memories)
 
 
 def write_start(settings: Settings, starts: Starts | Batch, i: int) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from shared_control_env.controllers.driver import Driver, PredictiveDriver
-from shared_control_env.envs.config import parameters_of
+from shared_control_env.envs.settings import parameters_of
 from shared_control_env.envs.slots import DRIVER
 from shared_control_env.wrappers.slots import SlotWrapper
 

@@ -34,7 +34,7 @@ BAD = [
     ({"faults": [{"kind": "loss_of_efectiveness", "onset": 0.5}]}, "did you mean 'loss_of_effectiveness'"),
     ({"faults": [{"kind": "saturation", "onset": 0.5, "size": 1.5}]}, r"\['size'\] = 1.5 must lie in \[0, 1\]"),
     ({"faults": [{"kind": "delay", "onset": 0.5, "size": 1.5}]}, r"\[0, 1\] for delay"),
-    ({"faults": [{"kind": "white_noise", "onset": 0.5, "size": -1.0}]}, r"\[0, inf\] for white_noise"),
+    ({"faults": [{"kind": "white_noise", "onset": 0.5, "size": -1.0}]}, r"\[0, 3.14159\] for white_noise"),
     ({"faults": [{"kind": "bias", "onset": 0.5, "size": 0.1, "duty": 2.0}]}, r"\['duty'\] = 2.0"),
     ({"degradations": ["stuk"]}, "did you mean 'stuck'"),
     ({"randomise": [{"setting": "ego.sped", "low": 1.0, "high": 2.0}]}, "no setting 'sped'; did you mean 'speed'"),

@@ -7,9 +7,9 @@ import pytest
 from shared_control_env.core.parameters import Limits
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.envs.cases import CASES
-from shared_control_env.envs.config import Settings, check, merge, plain
 from shared_control_env.envs.degradations import DEGRADATIONS, draw_degradation
 from shared_control_env.envs.episode import draw_episode, is_random
+from shared_control_env.envs.settings import Settings, check, merge, plain
 from shared_control_env.registration import ENVIRONMENTS
 
 DRAWN = [name for name, case in CASES.items() if case.settings.get("randomise")]

@@ -13,7 +13,7 @@ from tests.vector.agreement import assert_same_info, at, compare, gentle_driver
 TWO_LANE = "SharedControl/TwoLane-v0"
 LANE_CHANGE = "SharedControl/LaneChange-v0"
 SPEEDS = {"randomise": [{"setting": "ego.speed", "low": 8.0, "high": 16.0}]}
-IMPOSSIBLE = {"randomise": [{"setting": "ego.lateral_offset", "choices": [0.1, 99.0]}], "faults": []}
+IMPOSSIBLE = {"randomise": [{"setting": "ego.lateral_offset", "choices": [0.1, 9.0]}], "faults": []}
 
 
 def state(env):

@@ -1,0 +1,25 @@
+"""Settings of an environment: their schema, changes to them, their check, and what the core takes of them."""
+
+from shared_control_env.envs.settings.changes import ReadOnly, as_plain, change, difference, merge
+from shared_control_env.envs.settings.checks import LEAD_IN, WITHOUT_SIZE, assigned, check
+from shared_control_env.envs.settings.schema import OWN_TRAFFIC, RandomSettings, Settings, plain
+from shared_control_env.envs.settings.to_core import fault_records, parameters_of, plan_records
+
+__all__ = [
+    "LEAD_IN",
+    "OWN_TRAFFIC",
+    "WITHOUT_SIZE",
+    "RandomSettings",
+    "ReadOnly",
+    "Settings",
+    "as_plain",
+    "assigned",
+    "change",
+    "check",
+    "difference",
+    "fault_records",
+    "merge",
+    "parameters_of",
+    "plain",
+    "plan_records",
+]

@@ -1,0 +1,139 @@
+"""Changes to settings: merged deeply, in plain types, and with the draws taken away that they would be lost to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from shared_control_env.nearest import hint
+
+
+def as_plain(value: Any) -> Any:
+    """A value of a configuration in Python's own types: mappings, tuples, numbers and arrays of NumPy, tensors."""
+    if isinstance(value, Mapping):
+        return {key: as_plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_plain(item) for item in value]
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def merge(config: dict[str, Any], changes: Mapping[str, Any], path: str = "config") -> dict[str, Any]:
+    """Config with nested changes; lists are replaced whole.
+
+    Args:
+        config: settings as a plain dict.
+        changes: what differs; None for a section that may be absent takes it away.
+        path: of the settings, for messages.
+
+    Raises:
+        ValueError: for an unknown key, naming it and the nearest valid one.
+    """
+    if not isinstance(changes, Mapping):
+        raise ValueError(f"{path} = {changes!r} must be a dict with keys among {sorted(config)}")
+    merged = dict(config)
+    for key, value in changes.items():
+        if key not in config:
+            raise ValueError(f"{path}[{key!r}] is not a setting; {hint(key, config)}")
+        if isinstance(config[key], dict) and value is not None:
+            if not isinstance(value, Mapping):
+                raise ValueError(f"{path}[{key!r}] = {value!r} must be a dict with keys among {sorted(config[key])}")
+            value = merge(config[key], value, f"{path}[{key!r}]")
+        merged[key] = as_plain(value)
+    return merged
+
+
+def named(
+    changes: Mapping[str, Any], config: Mapping[str, Any], path: tuple[str, ...] = ()
+) -> Iterator[tuple[str, ...]]:
+    """Paths of the settings that changes name: sections of settings by their fields, all else whole.
+
+    Args:
+        changes: nested dict.
+        config: the settings that they change.
+        path: of the section.
+    """
+    for key, value in changes.items():
+        if isinstance(value, Mapping) and isinstance(config.get(key), Mapping):
+            yield from named(value, config[key], (*path, key))
+        else:
+            yield (*path, key)
+
+
+def at(config: Any, path: tuple[str, ...]) -> Any:
+    """The setting at a path.
+
+    Raises:
+        ValueError: if there is none, naming the part that is wrong and the nearest valid one.
+    """
+    for key in path:
+        if isinstance(config, list) and key.isdigit() and int(key) < len(config):
+            config = config[int(key)]
+        elif isinstance(config, Mapping) and key in config:
+            config = config[key]
+        else:
+            keys = range(len(config)) if isinstance(config, list) else config if isinstance(config, Mapping) else ()
+            raise ValueError(f"no setting {key!r}; {hint(key, keys)}")
+    return config
+
+
+def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """The changes that lead from one config to another, so that ``merge(old, changes)`` is the new one."""
+    changes: dict[str, Any] = {}
+    for key, value in new.items():
+        before = old.get(key)
+        if isinstance(value, Mapping) and isinstance(before, Mapping):
+            if inner := difference(before, value):
+                changes[key] = inner
+        elif key not in old or as_plain(value) != before:
+            changes[key] = value
+    return changes
+
+
+def change(config: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Config with a user's changes: what they name is no longer drawn.
+
+    A config that names everything, such as another environment's, is taken as it is.
+
+    Args:
+        config: settings as a plain dict.
+        changes: nested dict.
+
+    Raises:
+        ValueError: for an unknown key; or if the changes give a setting another value and have it drawn too.
+    """
+    merged = merge(config, changes)
+    if set(changes) == set(config):
+        return merged
+    paths = {".".join(path): path for path in named(changes, config)}
+    if "randomise" not in changes:
+        merged["randomise"] = [entry for entry in config["randomise"] if not _concerns(entry["setting"], paths)]
+        return merged
+    for i, entry in enumerate(merged["randomise"]):
+        setting = entry.get("setting") if isinstance(entry, Mapping) else None
+        if setting in paths and at(merged, paths[setting]) != at(config, paths[setting]):
+            raise ValueError(
+                f"config['randomise'][{i}] draws {setting!r}, which is set to {at(merged, paths[setting])!r} too; "
+                "leave one of the two out"
+            )
+    return merged
+
+
+def _concerns(setting: str, paths: Mapping[str, Any]) -> bool:
+    """Whether a drawn setting is one of those named, or a part of one."""
+    return any(setting == path or setting.startswith(f"{path}.") for path in paths)
+
+
+class ReadOnly(dict[str, Any]):
+    """A dict of settings, and those in it, that refuses to be changed where that would be lost."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        super().__init__({k: ReadOnly(v) if isinstance(v, Mapping) else v for k, v in values.items()})
+
+    def _refuse(self, *arguments: Any, **more: Any) -> Any:
+        raise TypeError("this config is read only; settings are changed by reset(options={'config': ...})")
+
+    __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickles and copies are plain dicts, which are their owner's."""
+        return dict, (list(self.items()),)

@@ -1,0 +1,286 @@
+"""The check of settings: each by itself by the schema, then together what only makes sense together."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from shared_control_env.core import parameters as core
+from shared_control_env.core.records import MAX_DELAY
+from shared_control_env.envs.degradations import NOISES
+from shared_control_env.envs.settings.changes import at
+from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, Settings
+from shared_control_env.nearest import hint, nearest
+
+SHARES, TIMES = ("loss_of_effectiveness", "saturation"), ("delay",)
+"""Kinds of degradation whose size is a share in [0, 1], and a time."""
+
+WITHOUT_SIZE = ("stuck", "drop_out", "sign_error", "missed_lead")
+"""Kinds of degradation that have no size."""
+
+PERCEPTUAL = {"lane_offset": ("steering",), "missed_lead": ("steering", "acceleration")}
+"""Kinds that concern the perception, and the channels that may be named with them, where the name has no effect."""
+
+LEAD_IN = 50.0
+"""Straight road behind the ego's start [m]."""
+
+LARGEST_OFFSET = 20.0
+"""Largest offset of the perceived position [m]: several lanes."""
+
+NOT_DRAWN = (
+    *("screen_width", "screen_height", "centering_position", "scaling"),
+    *("offscreen_rendering", "real_time_rendering", "neighbour_vehicles_connected_lanes", "other_vehicles_type"),
+    *("degradations", "randomise"),
+)
+"""Settings that are the same in all episodes of an environment."""
+
+
+def check(config: Mapping[str, Any]) -> Settings:
+    """Check a merged config.
+
+    Raises:
+        ValueError: naming field, value and allowed range, for the first setting that is wrong.
+    """
+    settings = _validated(config)
+    _check_time(settings)
+    _check_faults(settings)
+    _check_random(settings, config)
+    _check_road(settings)
+    _check_places(settings)
+    _check_vehicle(settings)
+    _check_idle(settings)
+    return settings
+
+
+def _validated(config: Mapping[str, Any]) -> Settings:
+    try:
+        return Settings.model_validate(config)
+    except ValidationError as error:
+        raise ValueError(_explain(error)) from None
+
+
+def _explain(error: ValidationError) -> str:
+    """Pydantic's first error in the words of this module."""
+    # An unknown key comes first: it may be the misspelt one that is missing.
+    first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+    path = "config" + "".join(f"[{key!r}]" for key in first["loc"])
+    if first["type"] == "extra_forbidden":
+        section = _field(first["loc"][:-1])[0]
+        return f"{path} is not a setting; {hint(first['loc'][-1], section.model_fields)}"
+    if first["type"] == "missing":
+        return f"{path} is missing"
+    text = f"{path} = {first['input']!r}: {first['msg'][0].lower()}{first['msg'][1:]}"
+    if first["type"] == "literal_error":
+        names = [name for name in first["ctx"]["expected"].split("'") if name.strip(" ,or")]
+        near = nearest(first["input"], names)
+        return text + (f"; did you mean {near!r}?" if near else "")
+    bounds = {name: value for each in _field(first["loc"])[1] for name, value in _bounds(each)}
+    ends = []
+    for word, name, open_name in (("smallest", "ge", "gt"), ("largest", "le", "lt")):
+        if name in bounds:
+            ends.append(f"the {word} is {bounds[name]:g}")
+        elif open_name in bounds:
+            ends.append(f"{'larger' if open_name == 'gt' else 'smaller'} than {bounds[open_name]:g}")
+    return text + (f" (allowed: {', '.join(ends)})" if ends else "")
+
+
+def _bounds(metadata: Any) -> list[tuple[str, Any]]:
+    found = ((name, getattr(metadata, name, None)) for name in ("gt", "ge", "lt", "le"))
+    return [(name, value) for name, value in found if value is not None]
+
+
+def _field(location: tuple[int | str, ...]) -> tuple[Any, list[Any]]:
+    """Type and constraints of the setting at a location; of a list's entries, what the list holds."""
+    kind: Any = Settings
+    constraints: list[Any] = []
+    for key in location:
+        if isinstance(key, str) and isinstance(kind, type) and issubclass(kind, BaseModel):
+            field = kind.model_fields[key]
+            kind, constraints = field.annotation, list(field.metadata)
+        while get_args(kind):  # the first of Optional, Annotated or list
+            constraints += [each for each in get_args(kind)[1:] if not isinstance(each, type)]
+            kind = get_args(kind)[0]
+    return kind, constraints
+
+
+def _check_time(settings: Settings) -> None:
+    simulation, policy = settings.simulation_frequency, settings.policy_frequency
+    if simulation % policy:
+        raise ValueError(
+            f"config['simulation_frequency'] = {simulation} Hz must be a multiple of "
+            f"config['policy_frequency'] = {policy} Hz"
+        )
+    if settings.steps < 1:
+        raise ValueError(f"config['duration'] = {settings.duration} s must be at least one step of {1 / policy} s")
+
+
+def _check_faults(settings: Settings) -> None:
+    """Sizes that their kinds allow, and nothing that a kind does not heed."""
+    for i, fault in enumerate(settings.faults):
+        name = f"config['faults'][{i}]"
+        for field, kinds in (("size", None), ("time_constant", ("coloured_noise",)), ("frequency", ("oscillation",))):
+            heeded = fault.kind not in WITHOUT_SIZE if kinds is None else fault.kind in kinds
+            _refuse_idle(name, fault, field, heeded, f"{fault.kind} has none")
+        _refuse_idle(name, fault, "seed", fault.kind in NOISES, f"{fault.kind} draws nothing")
+        _refuse_idle(name, fault, "duty", fault.period > 0.0, "it needs a 'period'")
+        if fault.channel not in PERCEPTUAL.get(fault.kind, (fault.channel,)):
+            raise ValueError(f"{name}['channel'] = {fault.channel!r}: {fault.kind} acts on no channel; leave it out")
+        if fault.kind in WITHOUT_SIZE:
+            continue
+        if fault.size is None:
+            raise ValueError(f"{name}['size'] is missing; {fault.kind} needs one")
+        low, high = _sizes(fault, settings)
+        if not low <= fault.size <= high:
+            raise ValueError(f"{name}['size'] = {fault.size} must lie in [{low:g}, {high:g}] for {fault.kind}")
+
+
+def _sizes(fault: FaultSettings, settings: Settings) -> tuple[float, float]:
+    """Range of a fault's size: beyond its ends no command, whatever the limits, is any more degraded."""
+    bound = core.LARGEST_ACCELERATION if fault.channel == "acceleration" else core.LARGEST_STEERING
+    if fault.kind in SHARES:
+        return 0.0, 1.0
+    if fault.kind in TIMES:
+        return 0.0, (MAX_DELAY - 1) / settings.policy_frequency
+    if fault.kind == "rate_limit":
+        return 0.0, 2.0 * bound * settings.policy_frequency
+    if fault.kind in NOISES:
+        return 0.0, 2.0 * bound
+    if fault.kind == "lane_offset":
+        return -LARGEST_OFFSET, LARGEST_OFFSET
+    return -2.0 * bound, 2.0 * bound
+
+
+def _refuse_idle(name: str, section: BaseModel, field: str, heeded: bool, reason: str) -> None:
+    """Raise ValueError for a field that is set to something else than its default, where nothing heeds it."""
+    value = getattr(section, field)
+    if not heeded and value != type(section).model_fields[field].default:
+        raise ValueError(f"{name}[{field!r}] = {value!r} would not act: {reason}")
+
+
+def _check_random(settings: Settings, config: Mapping[str, Any]) -> None:
+    """Paths that name a number, and something within its range to draw from."""
+    for i, entry in enumerate(settings.randomise):
+        name = f"config['randomise'][{i}]"
+        path = tuple(entry.setting.split("."))
+        try:
+            present = at(config, path)
+        except ValueError as error:
+            raise ValueError(f"{name}['setting'] = {entry.setting!r}: {error}") from None
+        if path[0] in NOT_DRAWN:
+            raise ValueError(f"{name}['setting'] = {entry.setting!r} is the same in all episodes; it cannot be drawn")
+        if isinstance(present, bool | str | list | Mapping):
+            raise ValueError(f"{name}['setting'] = {entry.setting!r} is no number, so that it cannot be drawn")
+        uniform = entry.low is not None and entry.high is not None and entry.low <= entry.high
+        if uniform == bool(entry.choices):
+            raise ValueError(f"{name} = {entry.model_dump()} must have either low <= high or choices")
+        for value in entry.choices or (entry.low, entry.high):
+            try:
+                _validated(assigned(config, path, value))
+            except ValueError as error:
+                raise ValueError(f"{name} draws a value that is not allowed: {error}") from None
+
+
+def assigned(config: Any, path: tuple[str, ...], value: Any) -> Any:
+    """A copy of a config with another value at a path that it has."""
+    first, rest = path[0], path[1:]
+    key: Any = int(first) if isinstance(config, list) else first
+    copy = config.copy() if isinstance(config, list) else dict(config)
+    copy[key] = assigned(config[key], rest, value) if rest else value
+    return copy
+
+
+def _check_road(settings: Settings) -> None:
+    """A road that does not meet itself, and whose lanes all bend."""
+    turned = sum(abs(segment.curvature) * segment.length for segment in settings.road.segments)
+    if turned > 2.0 * math.pi:
+        raise ValueError(
+            f"config['road']['segments'] turn by {turned:.3g} rad in all; allowed are 0 to {2 * math.pi:.4g}, "
+            "so that the road does not meet itself"
+        )
+    if settings.road_length > core.LONGEST_ROAD:
+        raise ValueError(
+            f"config['road']['segments'] are {settings.road_length} m long in all; the largest is {core.LONGEST_ROAD} m"
+        )
+    lanes, width = settings.road.lanes, settings.road.lane_width
+    leftmost, edge = settings.lane_centre(lanes - 1), 0.5 * width
+    for segment in settings.road.segments:
+        if segment.curvature * (leftmost + edge) >= 1.0 or segment.curvature * -edge >= 1.0:
+            raise ValueError(
+                f"config['road']['segments']: curvature = {segment.curvature} 1/m is too sharp for {lanes} lanes of "
+                f"{width} m; allowed are {-1 / edge:.4g} to {1 / (leftmost + edge):.4g}, both excluded"
+            )
+
+
+def _check_places(settings: Settings) -> None:
+    """Lanes that exist, and no two vehicles in one place."""
+    lanes, edge = settings.road.lanes, 0.5 * settings.road.lane_width
+    if abs(settings.ego.lateral_offset) > edge:
+        raise ValueError(
+            f"config['ego']['lateral_offset'] = {settings.ego.lateral_offset} m must lie in "
+            f"[{-edge}, {edge}], within the lane"
+        )
+    placed = [("config['ego']", settings.ego.lane, 0.0)]
+    changes = [("config", settings.lane_change)]
+    for i, vehicle in enumerate(settings.vehicles):
+        name = f"config['vehicles'][{i}]"
+        if not -LEAD_IN <= vehicle.position <= settings.road_length:
+            raise ValueError(
+                f"{name}['position'] = {vehicle.position} m is not on the road, [{-LEAD_IN}, {settings.road_length}] m"
+            )
+        placed.append((name, vehicle.lane, vehicle.position))
+        changes.append((name, vehicle.lane_change))
+    for name, change in changes:
+        if change is not None and change.lane >= lanes:
+            raise ValueError(f"{name}['lane_change']['lane'] = {change.lane} must lie in [0, {lanes - 1}]")
+    for i, (name, lane, position) in enumerate(placed):
+        if lane >= lanes:
+            raise ValueError(f"{name}['lane'] = {lane} must lie in [0, {lanes - 1}]")
+        for other, other_lane, other_position in placed[:i]:
+            if lane == other_lane and abs(position - other_position) < settings.vehicle.length:
+                raise ValueError(
+                    f"{name}['position'] = {position} m overlaps {other} at {other_position} m: "
+                    f"in one lane the distance must be at least the vehicle length, {settings.vehicle.length} m"
+                )
+
+
+def _check_vehicle(settings: Settings) -> None:
+    """Stable at the speeds of the task; a warning where it would not be at motorway speed."""
+    vehicle = core.VehicleParameters(**settings.vehicle.model_dump())
+    critical = core.critical_speed(vehicle)
+    fastest = max(settings.ego.speed, settings.task.target_speed)
+    what = (
+        f"config['vehicle'] = {vehicle} oversteers with a critical speed of {critical:.1f} m/s "
+        "(l_f C_f must not exceed l_r C_r by too much)"
+    )
+    if critical <= fastest:
+        raise ValueError(f"{what}; it must lie above the task's highest speed, {fastest} m/s")
+    if critical <= 40.0:
+        warnings.warn(f"{what}: the car is unstable above it, within the model's range of 40 m/s", stacklevel=2)
+
+
+def _check_idle(settings: Settings) -> None:
+    """Nothing that is set and would not act beside the other settings."""
+    own = settings.other_vehicles_type == OWN_TRAFFIC
+    for i, vehicle in enumerate(settings.vehicles):
+        name = f"config['vehicles'][{i}]"
+        for field in ("behaviour", "brake", "lane_change", "desired_speed"):
+            reason = f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} knows no plans"
+            _refuse_idle(name, vehicle, field, own, reason)
+        _refuse_idle(name, vehicle, "desired_speed", vehicle.behaviour == "idm", "it is of the behaviour 'idm'")
+        if vehicle.lane_change is not None and vehicle.lane_change.lane == vehicle.lane:
+            raise ValueError(
+                f"{name}['lane_change']['lane'] = {vehicle.lane} would not act: the vehicle is in that lane"
+            )
+    reason = "the traffic of this package looks for no neighbours by itself"
+    _refuse_idle("config", settings, "neighbour_vehicles_connected_lanes", not own, reason)
+    risk, name = settings.longitudinal_risk, "config['longitudinal_risk']"
+    _refuse_idle(name, risk, "sigma_x", risk.preset == "paper", "it is of the preset 'paper'")
+    for field in ("w_f_change", "w_l_change", "w_p_change"):
+        _refuse_idle(name, risk, field, settings.lane_change is not None, "there is no config['lane_change']")
+    for field in ("tolerance_a", "tolerance_delta"):
+        law = settings.authority.law
+        _refuse_idle("config['law_tolerances']", settings.law_tolerances, field, law == "paper", f"the law is {law!r}")

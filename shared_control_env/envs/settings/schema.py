@@ -1,0 +1,229 @@
+"""Settings of an environment: types, defaults, units and ranges.
+
+The sections that hold the model's parameters are made from the named tuples of
+:mod:`shared_control_env.core.parameters`, where each is documented with its source; there is no second
+list of them.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Any, Literal, get_args, get_type_hints
+
+from annotated_types import Interval, MaxLen, MinLen
+from pydantic import BaseModel, BeforeValidator, ConfigDict, create_model
+
+from shared_control_env.core import parameters as core
+from shared_control_env.core.authority import LAWS
+from shared_control_env.core.degradation import KINDS
+from shared_control_env.core.fuzzy import OPERATORS
+from shared_control_env.core.parameters import Fraction, NonNegative, Positive, Speed, TargetSpeed
+from shared_control_env.envs.degradations import DEGRADATIONS
+
+OWN_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
+"""Traffic that the core drives, by its plans."""
+
+PANEL_HEIGHT = 192
+"""Height of the gauges' panel in pictures [px]."""
+
+
+def _whole(value: Any) -> Any:
+    """A float that is a whole number as an integer."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Lane = Annotated[int, Interval(ge=0, lt=core.MOST_LANES), BeforeValidator(_whole)]
+"""Number of a lane; 0 is the rightmost."""
+
+Seed = Annotated[int, Interval(ge=0, lt=2**63), BeforeValidator(_whole)]
+"""Seed of noise; the core keeps it in 64 bits."""
+
+
+def _count(largest: int, smallest: int = 1) -> Any:
+    return Annotated[int, Interval(ge=smallest, le=largest), BeforeValidator(_whole)]
+
+
+class Section(BaseModel):
+    """Base of all groups of settings: nothing unknown, nothing of another type, no infinity."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+
+def _section(name: str, parameters: Any, *left_out: str, **more: Any) -> Any:
+    """Settings with the fields, types, ranges, defaults and documentation of a named-tuple class.
+
+    The class goes by the name that it is assigned to here, so that it can be pickled.
+    """
+    hints = get_type_hints(parameters, include_extras=True)
+    defaults = parameters._field_defaults
+    for field, hint in hints.items():
+        if (get_args(hint) or (hint,))[0] is int:
+            hints[field] = Annotated[hint, BeforeValidator(_whole)]
+    fields = {field: (hints[field], defaults[field]) for field in defaults if field not in left_out}
+    return create_model(name, __base__=Section, __module__=__name__, __doc__=parameters.__doc__, **fields, **more)
+
+
+class Segment(Section):
+    """A piece of the road's reference line, which is the centre of lane 0."""
+
+    length: Annotated[float, Interval(gt=0.0, le=core.LONGEST_ROAD)]  # [m]
+    curvature: Annotated[float, Interval(ge=-1.0, le=1.0)] = 0.0  # [1/m], positive to the left
+
+
+class RoadSettings(Section):
+    """The road. Lanes are counted from the right; lane 0 is the rightmost."""
+
+    segments: Annotated[list[Segment], MinLen(1), MaxLen(200)] = [Segment(length=1000.0)]
+    lanes: _count(core.MOST_LANES) = 2
+    lane_width: Annotated[float, Interval(gt=0.0, le=20.0)] = 4.0  # [m]
+
+
+class EgoSettings(Section):
+    """Where the ego starts: at s = 0, in the lane that it is to keep."""
+
+    lane: Lane = 0
+    speed: Speed = 15.0  # [m/s]
+    lateral_offset: Annotated[float, Interval(ge=-10.0, le=10.0)] = (
+        0.0  # from the lane's centre, positive to the left [m]
+    )
+
+
+class BrakeSettings(Section):
+    """Braking to a stop."""
+
+    onset: NonNegative  # [s]
+    deceleration: Annotated[float, Interval(gt=0.0, le=20.0)]  # [m/s^2]
+
+
+class LaneChangeSettings(Section):
+    """A move over to another lane (core.lane_change)."""
+
+    onset: NonNegative  # [s]
+    duration: Annotated[float, Interval(ge=0.1, le=100.0)] = 4.0  # [s]
+    lane: Lane
+
+
+class VehicleSettings(Section):
+    """Another vehicle at its start; positions are those of the centres, relative to the ego's (core.traffic)."""
+
+    lane: Lane
+    position: Annotated[float, Interval(ge=-core.LONGEST_ROAD, le=core.LONGEST_ROAD)]  # along the road [m]
+    speed: Speed  # [m/s]
+    behaviour: Literal["constant", "idm"] = "constant"
+    desired_speed: TargetSpeed | None = None  # of idm [m/s]; None for its first speed
+    brake: BrakeSettings | None = None
+    lane_change: LaneChangeSettings | None = None
+
+
+class FaultSettings(Section):
+    """A degradation of the automation (core.degradation); what its size means depends on its kind."""
+
+    kind: Literal[KINDS[1:]] = "bias"
+    channel: Literal["acceleration", "steering", "both"] = "steering"
+    onset: NonNegative  # [s]
+    ramp: NonNegative = 0.0  # [s]
+    duration: Positive | None = None  # [s]; None for a permanent one
+    period: NonNegative = 0.0  # of one that comes and goes [s]; 0 for one that stays
+    duty: Fraction = 0.5  # share of the period in which it is there
+    size: float | None = None
+    time_constant: Annotated[float, Interval(ge=1e-3, le=1e3)] = 0.5  # of coloured noise [s]
+    frequency: Annotated[float, Interval(gt=0.0, le=1e3)] = 0.5  # of an oscillation [Hz]
+    seed: Seed | None = None  # of noise; None to have it drawn
+
+
+class RandomSettings(Section):
+    """A setting drawn at the start of each episode: uniform between two ends, or one of several values."""
+
+    setting: str  # its path, such as "ego.speed" or "vehicles.0.position"
+    low: float | None = None
+    high: float | None = None
+    choices: Annotated[list[float], MaxLen(10_000)] | None = None
+
+
+class AuthoritySettings(Section):
+    """Authority of the automation (core.authority, core.fuzzy)."""
+
+    law: Literal[LAWS] = "paper"
+    operators: Literal[OPERATORS] = "product-sum"
+
+
+class SolverSettings(Section):
+    """Gauss-Newton iterations of the automation."""
+
+    iterations: _count(100) = 3
+    first_iterations: _count(100) = 5
+
+
+_TASK_FROM_ROAD = (
+    *("dt", "lane_width", "road_low", "road_high", "road_end", "y_target", "y_goal"),
+    *("change_onset", "change_duration"),
+)
+_Longitudinal = _section(
+    "_Longitudinal", core.LongitudinalRiskParameters, "graded", preset=(Literal["paper", "graded"], "graded")
+)
+_Task = _section("_Task", core.TaskParameters, *_TASK_FROM_ROAD)
+_Vehicle = _section("_Vehicle", core.VehicleParameters)
+_Limits = _section("_Limits", core.Limits)
+_Automation = _section("_Automation", core.PredictiveParameters)
+_Driver = _section("_Driver", core.PredictiveParameters, "R")  # the driver's cost has no potential field
+_SafeArea = _section("_SafeArea", core.SafeAreaParameters)
+_Lateral = _section("_Lateral", core.LateralRiskParameters)
+_Law = _section("_Law", core.LawParameters)
+_Lag = _section("_Lag", core.DriverLagParameters)
+_Reward = _section("_Reward", core.RewardParameters)
+
+
+class Settings(Section):
+    """All settings. The first group is highway-env's own, with its meaning there."""
+
+    simulation_frequency: _count(1000) = 20  # [Hz]
+    policy_frequency: _count(100) = 20  # [Hz]
+    other_vehicles_type: str = OWN_TRAFFIC
+    screen_width: _count(4096, smallest=160) = 1000  # [px]
+    screen_height: _count(4096, smallest=PANEL_HEIGHT + 8) = 452  # [px]
+    centering_position: Annotated[list[Fraction], MinLen(2), MaxLen(2)] = [0.3, 0.5]
+    scaling: Annotated[float, Interval(ge=0.1, le=1000.0)] = 11.0  # [px/m]
+    offscreen_rendering: bool | None = None
+    real_time_rendering: bool = False
+    neighbour_vehicles_connected_lanes: bool = True
+
+    duration: Annotated[float, Interval(gt=0.0, le=3600.0)] = 10.0  # [s]
+    road: RoadSettings = RoadSettings()
+    ego: EgoSettings = EgoSettings()
+    lane_change: LaneChangeSettings | None = None  # of the ego; None to keep the lane
+    vehicles: Annotated[list[VehicleSettings], MaxLen(100)] = []
+    faults: Annotated[list[FaultSettings], MaxLen(20)] = []
+    degradations: list[Literal[tuple(DEGRADATIONS)]] = []  # one of these is drawn at the start of each episode
+    randomise: Annotated[list[RandomSettings], MaxLen(1000)] = []
+    task: _Task = _Task()
+    authority: AuthoritySettings = AuthoritySettings()
+    law_tolerances: _Law = _Law()
+    lateral_risk: _Lateral = _Lateral()
+    longitudinal_risk: _Longitudinal = _Longitudinal()
+    safe_area: _SafeArea = _SafeArea()
+    automation: _Automation = _Automation()
+    solver: SolverSettings = SolverSettings()
+    driver: _Driver = _Driver()
+    driver_lag: _Lag = _Lag()
+    limits: _Limits = _Limits()
+    vehicle: _Vehicle = _Vehicle()
+    reward: _Reward = _Reward()
+
+    @property
+    def steps(self) -> int:
+        """Length of an episode in decisions."""
+        return round(self.duration * self.policy_frequency)
+
+    @property
+    def road_length(self) -> float:
+        """Length of the road ahead of the start [m]."""
+        return sum(segment.length for segment in self.road.segments)
+
+    def lane_centre(self, lane: int) -> float:
+        """Lateral position of a lane's centre in the road frame [m]."""
+        return lane * self.road.lane_width
+
+
+def plain(settings: Settings) -> dict[str, Any]:
+    """Settings as a dict of JSON's own types, which an environment's spec can store."""
+    return json.loads(settings.model_dump_json())

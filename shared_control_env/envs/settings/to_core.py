@@ -1,0 +1,96 @@
+"""Checked settings as what the compiled core takes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from shared_control_env.core import parameters as core
+from shared_control_env.core.authority import LAWS
+from shared_control_env.core.degradation import KINDS
+from shared_control_env.core.fuzzy import OPERATORS
+from shared_control_env.core.records import pack, record_dtype
+from shared_control_env.envs.settings.schema import Settings
+
+
+def parameters_of(settings: Settings) -> core.Parameters:
+    """The core's parameters of checked settings."""
+
+    def values(section: BaseModel, **more: Any) -> dict[str, Any]:
+        return {**section.model_dump(), **more}
+
+    longitudinal = values(settings.longitudinal_risk)
+    longitudinal["graded"] = longitudinal.pop("preset") == "graded"
+    width, change = settings.road.lane_width, settings.lane_change
+    return core.Parameters(
+        vehicle=core.VehicleParameters(**values(settings.vehicle)),
+        limits=core.Limits(**values(settings.limits)),
+        automation=core.PredictiveParameters(**values(settings.automation)),
+        driver=core.PredictiveParameters(**values(settings.driver)),
+        safe_area=core.SafeAreaParameters(**values(settings.safe_area)),
+        lateral=core.LateralRiskParameters(**values(settings.lateral_risk)),
+        longitudinal=core.LongitudinalRiskParameters(**longitudinal),
+        law=core.LawParameters(**values(settings.law_tolerances)),
+        lag=core.DriverLagParameters(**values(settings.driver_lag)),
+        reward=core.RewardParameters(**values(settings.reward)),
+        task=core.TaskParameters(
+            **values(settings.task),
+            dt=1.0 / settings.policy_frequency,
+            lane_width=width,
+            road_low=-0.5 * width,
+            road_high=settings.lane_centre(settings.road.lanes) - 0.5 * width,
+            road_end=settings.road_length,
+            y_target=settings.lane_centre(settings.ego.lane),
+            y_goal=settings.lane_centre(settings.ego.lane if change is None else change.lane),
+            change_onset=math.inf if change is None else change.onset,
+            change_duration=4.0 if change is None else change.duration,
+        ),
+        authority=core.AuthorityParameters(
+            law=LAWS.index(settings.authority.law),
+            operators=OPERATORS.index(settings.authority.operators),
+            **values(settings.solver),
+        ),
+    )
+
+
+def fault_records(settings: Settings) -> np.ndarray:
+    """Faults as records of :class:`core.DegradationParameters`, shape (n,)."""
+    records = np.zeros(len(settings.faults), record_dtype(core.DegradationParameters))
+    for i, fault in enumerate(settings.faults):
+        records[i] = pack(
+            core.DegradationParameters(
+                kind=KINDS.index(fault.kind),
+                acceleration=fault.channel != "steering",
+                steering=fault.channel != "acceleration",
+                onset=fault.onset,
+                ramp=fault.ramp,
+                duration=math.inf if fault.duration is None else fault.duration,
+                period=fault.period,
+                duty=fault.duty,
+                size=fault.size or 0.0,
+                time_constant=fault.time_constant,
+                frequency=fault.frequency,
+                seed=fault.seed or 0,
+            )
+        )
+    return records
+
+
+def plan_records(settings: Settings) -> np.ndarray:
+    """The other vehicles' plans as records of :class:`core.TrafficParameters`, shape (n,)."""
+    records = np.zeros(len(settings.vehicles), record_dtype(core.TrafficParameters))
+    for i, vehicle in enumerate(settings.vehicles):
+        plan = core.TrafficParameters(
+            follows=vehicle.behaviour == "idm", desired_speed=vehicle.desired_speed or max(vehicle.speed, 1.0)
+        )
+        if vehicle.brake is not None:
+            plan = plan._replace(brake_onset=vehicle.brake.onset, deceleration=vehicle.brake.deceleration)
+        change = vehicle.lane_change
+        if change is not None:
+            shift = settings.lane_centre(change.lane) - settings.lane_centre(vehicle.lane)
+            plan = plan._replace(change_onset=change.onset, change_duration=change.duration, shift=shift)
+        records[i] = pack(plan)
+    return records

@@ -58,11 +58,16 @@ def check_card(path: Path, card: Mapping[str, Any]) -> None:
         ValueError: if the task, what it sees, how it acts, or the versions of its environments differ, naming what
             does; or if the card lacks one of these.
     """
+    if not isinstance(card, Mapping):
+        raise ValueError(f"{path} has no card of a training in it: {card!r}")
     missing = sorted({"task", "features", "history", "dead_zone", "environments"} - set(card))
     if missing:
         raise ValueError(f"{path} is no policy of this version of agents.train: its card lacks {', '.join(missing)}")
     task, features = card["task"], card["features"]
-    if task not in FEATURES_OF:
+    for name in ("features", "environments"):
+        if not isinstance(card[name], list) or not all(isinstance(each, str) for each in card[name]):
+            raise ValueError(f"{path}: its card's {name} = {card[name]!r} must be a list of names")
+    if not isinstance(task, str) or task not in FEATURES_OF:
         raise ValueError(f"{path} was trained for the task {task!r}; known are {', '.join(FEATURES_OF)}")
     known = [name for name, _ in FEATURES_OF[task]]
     if features != known:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import TypeVar
 
@@ -24,6 +25,7 @@ def _policy(path: Path) -> Callable[[], Driver]:
 
 
 def _model(path: Path) -> Callable[[], Driver]:
+    """A model of Stable-Baselines3: pickled code, which runs as it is read."""
     from agents.model_driver import ModelDriver  # which needs Stable-Baselines3
 
     return partial(ModelDriver, ModelDriver.read(path))
@@ -53,6 +55,11 @@ def _read(what: str, path: Path, read: Callable[[Path], Callable[[], T]]) -> Cal
     return make
 
 
+def _digest(path: Path) -> str:
+    """What tells a file from others of the same name."""
+    return sha256(path.read_bytes()).hexdigest()[:16]
+
+
 def shipped(task: str) -> dict[str, Path]:
     """Policies that ship, by name.
 
@@ -62,19 +69,27 @@ def shipped(task: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted(POLICIES.glob(f"{task}-*.npz"))}
 
 
-def driver_entry(source: str) -> DriverEntry:
+def driver_entry(source: str, trusted: bool = False) -> DriverEntry:
     """A driver for :func:`shared_control_env.evaluation.evaluate`; its ``make`` is for ``DriverModel``.
 
     Args:
         source: name of the benchmark's catalogue, such as ``mpc``; of a policy that ships, such as ``driver-0``; or a
             file: a policy (``.npz``), a model of Stable-Baselines3 (``.zip``), or a recording (``.csv``).
+        trusted: whether a model may be read: it holds pickled code, which can do anything as it is read. The other
+            files hold numbers alone.
 
     Raises:
-        ValueError: for an unknown name, with the nearest, or a file that is none of these.
+        ValueError: for an unknown name, with the nearest, a file that is none of these, or a model not trusted.
     """
-    path = shipped("driver").get(source, Path(source))
+    path = shipped("driver").get(source, Path(source).expanduser())
+    if path.suffix == ".zip" and path.is_file() and not trusted:
+        raise ValueError(
+            f"driver = {str(path)!r} holds pickled code, which runs as it is read; if you trust where it is from, pass "
+            "trusted=True (--trusted). Policies of agents.train (.npz) hold numbers alone."
+        )
     if path.suffix in READERS:
-        return DriverEntry(f"of {path.name}", _read("driver", path, READERS[path.suffix]))
+        make = _read("driver", path, READERS[path.suffix])
+        return DriverEntry(f"of {path.name}", make, fingerprint=_digest(path))
     return choose("driver", source, {**DRIVERS, **dict.fromkeys(shipped("driver"))})[source]
 
 
@@ -88,7 +103,8 @@ def authority_entry(source: str) -> AuthorityEntry:
     Raises:
         ValueError: for an unknown name, with the nearest, or a file that is no policy.
     """
-    path = shipped("allocator").get(source, Path(source))
+    path = shipped("allocator").get(source, Path(source).expanduser())
     if path.suffix == ".npz":
-        return AuthorityEntry(f"of {path.name}", "proportional", _read("authority", path, _allocator))
+        make = _read("authority", path, _allocator)
+        return AuthorityEntry(f"of {path.name}", "proportional", make, fingerprint=_digest(path))
     return choose("authority", source, {**AUTHORITIES, **dict.fromkeys(shipped("allocator"))})[source]

@@ -38,14 +38,20 @@ class ModelDriver:
 
     @staticmethod
     def read(path: Path | str) -> BaseAlgorithm:
-        """The model in a file, of PPO, SAC or TD3.
+        """The model in a file, of PPO, SAC or TD3. Pickled code in the file is run.
 
         Raises:
-            ValueError: if it is no model, or its policy is of none of these.
+            ValueError: if it is no model, its policy is of none of these, or it was trained on normalised observations.
         """
         data, _, _ = load_from_zip_file(path, device="cpu")
         if not data or "policy_class" not in data:
             raise ValueError(f"{path} is no model of Stable-Baselines3")
+        last = data.get("_last_obs")
+        if last is not None and np.abs(np.asarray(last, dtype=float)).max() > 1.0:
+            raise ValueError(
+                f"{path} was trained on observations beyond the environment's bounds, so behind VecNormalize or the like, "
+                "whose statistics it does not hold; train without, or with agents.train, which has its own"
+            )
         made_by = data["policy_class"]
         for algorithm in ALGORITHMS.values():
             if made_by in algorithm.policy_aliases.values():

@@ -11,8 +11,16 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from agents.card import check_card
-from agents.history import History
-from agents.views import ALLOCATOR_FEATURES, DRIVER_FEATURES, allocator_view, authority, command, driver_view
+from agents.history import HISTORY, History
+from agents.views import (
+    ALLOCATOR_FEATURES,
+    DRIVER_FEATURES,
+    FEATURES_OF,
+    allocator_view,
+    authority,
+    command,
+    driver_view,
+)
 from shared_control_env.core.parameters import Limits
 
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -21,6 +29,9 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 """Nonlinearities of the hidden layers."""
 
+
+ACTIONS = {"driver": 2, "allocator": 1}
+"""Numbers in the action of each task."""
 
 Layer: TypeAlias = tuple[np.ndarray, np.ndarray]
 """Weights (out, in) and biases (out,)."""
@@ -80,10 +91,33 @@ class Policy:
                 layers = [(stored[f"W{i}"], stored[f"b{i}"]) for i in range(count)]
             shape = card.pop("shape")
             policy = cls(layers, shape["hidden"], shape["squashed"], card)
-        except (KeyError, ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        except (KeyError, ValueError, TypeError, AttributeError, EOFError, OSError, zipfile.BadZipFile) as error:
             raise ValueError(f"{path} is no policy of agents.train: {error!r}") from None
         check_card(path, card)
+        policy._check(path)
         return policy
+
+    def _check(self, path: Path) -> None:
+        """Raise ValueError unless the layers make an action of the task of what it sees, in finite numbers."""
+        if self.hidden not in ACTIVATIONS or not isinstance(self.squashed, bool):
+            raise ValueError(
+                f"{path} has the shape hidden = {self.hidden!r}, squashed = {self.squashed!r}; known are "
+                f"{', '.join(ACTIVATIONS)}, and true or false"
+            )
+        task = self.card["task"]
+        sizes = [HISTORY * len(FEATURES_OF[task]), *(len(biases) for _, biases in self.layers)]
+        if len(sizes) < 2 or sizes[-1] != ACTIONS[task]:
+            raise ValueError(
+                f"{path} has {len(self.layers)} layer(s) and {sizes[-1]} outputs; it must have {ACTIONS[task]}"
+            )
+        for i, (weights, biases) in enumerate(self.layers):
+            if weights.shape != (sizes[i + 1], sizes[i]) or biases.shape != (sizes[i + 1],):
+                raise ValueError(
+                    f"{path}: layer {i} has weights of shape {weights.shape} and biases of shape {biases.shape}; they "
+                    f"must be ({sizes[i + 1]}, {sizes[i]}) and ({sizes[i + 1]},)"
+                )
+            if weights.dtype.kind != "f" or biases.dtype.kind != "f" or not np.isfinite(weights.sum() + biases.sum()):
+                raise ValueError(f"{path}: layer {i} has weights or biases that are not finite numbers")
 
 
 def fold(layers: list[Layer], mean: np.ndarray, std: np.ndarray) -> list[Layer]:

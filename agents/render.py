@@ -34,7 +34,7 @@ class Drive(NamedTuple):
     frames: list[np.ndarray]
 
 
-def drive(scenario: str, degradation: str, seed: int, driver: str, authority: str) -> Drive:
+def drive(scenario: str, degradation: str, seed: int, driver: str, authority: str, trusted: bool = False) -> Drive:
     """Run one episode.
 
     Args:
@@ -43,9 +43,10 @@ def drive(scenario: str, degradation: str, seed: int, driver: str, authority: st
         seed: of the episode.
         driver: as :func:`agents.drivers.driver_entry` takes it.
         authority: as :func:`agents.drivers.authority_entry` takes it.
+        trusted: whether a model of Stable-Baselines3 may be read.
     """
     frames: list[np.ndarray] = []
-    entries = (driver, driver_entry(driver)), (authority, authority_entry(authority))
+    entries = (driver, driver_entry(driver, trusted)), (authority, authority_entry(authority))
     metrics = replay_episode(scenario, *entries, degradation, seed, frames)
     limiter = "no limit" if authority == "none" else f"authority {authority}"
     outcome = "collision, " * bool(metrics["collisions"]) + "off the road, " * bool(metrics["road_departures"])
@@ -93,6 +94,7 @@ def main(
         "mpc:proportional,driver-0:proportional,mpc:none"
     ),
     out: Annotated[Path | None, typer.Option(help="MP4; by default under results/videos.")] = None,
+    trusted: Annotated[bool, typer.Option(help="Read models (.zip), whose code runs as they are read.")] = False,
 ) -> None:
     """Write an MP4 of the same episode with the predictive driver, a trained one, and without a limit."""
     console = Console()
@@ -110,7 +112,7 @@ def main(
         with Progress(*columns, console=console) as bar:
             running = bar.add_task("episodes", total=len(pairs))
             for driver, _, authority in pairs:
-                drives.append(drive(scenario, degradation, seed, driver, authority or "proportional"))
+                drives.append(drive(scenario, degradation, seed, driver, authority or "proportional", trusted))
                 console.print(drives[-1].title)
                 bar.advance(running)
     except ValueError as error:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from concurrent.futures import ProcessPoolExecutor, wait
-from multiprocessing import active_children, get_context
+from concurrent.futures import wait
+from multiprocessing import active_children
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -28,6 +28,7 @@ from agents.train import BEST, PROGRESS, Training
 from agents.views import DEAD_ZONE
 from experiments import style
 from shared_control_env.evaluation import SUITES
+from shared_control_env.evaluation.engines import worker_pool
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
@@ -71,7 +72,7 @@ def train_all(jobs: int, console: Console) -> None:
     """Train all policies, several at once."""
     runs = [(task, seed) for task in TASKS for seed in SEEDS]
     columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar, ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+    with Progress(*columns, console=console) as bar, worker_pool(jobs) as pool:
         progress = bar.add_task("steps", total=sum(STEPS[task] for task, _ in runs))
         waiting = {pool.submit(train, task, seed, STEPS[task]) for task, seed in runs}
         try:

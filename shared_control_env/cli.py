@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,7 +27,7 @@ except ImportError:
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose
-from shared_control_env.evaluation.episodes import AS_GIVEN
+from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
@@ -39,23 +42,59 @@ COLUMNS = {
 """Columns of the results whose means are printed, and their titles; a failure is a collision or a road departure."""
 
 
-def _names(text: str, known: dict[str, Any]) -> list[str]:
+def _version(wanted: bool) -> None:
+    if wanted:
+        from shared_control_env import __version__
+
+        typer.echo(f"shared_control_env {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print it.")] = False,
+) -> None:
+    """Read what goes before a command."""
+
+
+def _names(text: str) -> list[str] | str:
     """Names of an option: separated by commas, or ``all``."""
-    return list(known) if text == "all" else [name.strip() for name in text.split(",") if name.strip()]
+    return text if text == "all" else [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _seeds(text: str) -> list[int]:
     """Seeds of an option: numbers and ranges such as 0-9, separated by commas."""
-    try:
-        numbers: list[int] = []
-        for part in text.split(","):
-            low, _, high = part.partition("-")
-            numbers += range(int(low), int(high or low) + 1)
-    except ValueError:
-        raise typer.BadParameter(f"seeds = {text!r} must be numbers and ranges, such as 0-9 or 1,2,5") from None
-    if not numbers or min(numbers) < 0:
-        raise typer.BadParameter(f"seeds = {text!r} must name at least one seed, none below 0")
+    numbers: list[int] = []
+    for part in text.split(","):
+        low, dash, high = part.strip().partition("-")
+        if not low.isdecimal() or (dash and not high.isdecimal()):
+            raise typer.BadParameter(f"seeds = {text!r} must be numbers and ranges from 0 on, such as 0-9 or 1,2,5")
+        first, last = int(low), int(high or low)
+        if first > last or last >= 2**63 or last - first >= MOST_SEEDS:
+            raise typer.BadParameter(
+                f"seeds = {text!r}: {part.strip()!r} must go up, by at most {MOST_SEEDS}, the largest number of seeds, "
+                f"and to {2**63 - 1}, the largest seed"
+            )
+        numbers += range(first, last + 1)
     return list(dict.fromkeys(numbers))
+
+
+@contextmanager
+def _in_words(console: Console) -> Iterator[None]:
+    """Tell warnings in a line each, and errors of what was asked for as such."""
+
+    def tell(message: Any, *_: Any, **__: Any) -> None:
+        console.print(f"Note: {message}", markup=False, highlight=False)
+
+    from shared_control_env.evaluation.engines import WorkersLostError
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = tell
+        try:
+            yield
+        except (ValueError, ImportError, WorkersLostError) as error:
+            raise typer.BadParameter(str(error)) from None
 
 
 @app.command()
@@ -74,12 +113,13 @@ def benchmark(
 
     console = Console()
     columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with resumable(out), Progress(*columns, console=console) as bar:
+    out = out.expanduser()
+    with _in_words(console), resumable(out), Progress(*columns, console=console) as bar:
         task = bar.add_task("episodes", total=None)
         try:
             table = evaluate(
-                _names(drivers, DRIVERS),
-                _names(authorities, AUTHORITIES),
+                _names(drivers),
+                _names(authorities),
                 suite,
                 seeds=_seeds(seeds),
                 out=out,
@@ -88,24 +128,29 @@ def benchmark(
                 engine=engine,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),
             )
-        except (ValueError, ImportError) as error:
-            raise typer.BadParameter(str(error)) from None
         except OSError as error:
             bar.stop()
             console.print(f"[red]{error}[/]: what could be written until then is in {out}; start again to go on.")
             raise typer.Exit(1) from None
-    console.print(summary(table))
+    console.print(summary(table, console.width))
     console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.")
 
 
-def summary(table: Any) -> Table:
-    """Means of the main metrics by authority and driver."""
+def summary(table: Any, width: int = 80) -> Table:
+    """Means of the main metrics by authority and driver: side by side, or one below the other in a narrow terminal."""
+    means = table.groupby(["authority", "driver"])[list(COLUMNS)].mean()
+    names = max(sum(map(len, pair)) for pair in means.index)
+    if names + 50 > width:
+        narrow = Table("pair", "mean", "", title="Means over all episodes", pad_edge=False)
+        for (authority, driver), row in means.iterrows():
+            for title, value in zip(COLUMNS.values(), row, strict=True):
+                narrow.add_row(f"{authority}, {driver}", title, f"{value:.2g}")
+        return narrow
     printed = Table(title="Means over all episodes", pad_edge=False)
     for name in ("authority", "driver"):
         printed.add_column(name, no_wrap=True)
     for title in COLUMNS.values():
         printed.add_column(title, justify="right", min_width=len(max(title.split(), key=len)))
-    means = table.groupby(["authority", "driver"])[list(COLUMNS)].mean()
     for (authority, driver), row in means.iterrows():
         printed.add_row(authority, driver, *(f"{value:.2g}" for value in row))
     return printed
@@ -118,32 +163,53 @@ def replay(
     authority: Annotated[str, typer.Option(help="Authority.")] = "paper",
     degradation: Annotated[str, typer.Option(help="Degradation; own for the scenario's.")] = AS_GIVEN,
     seed: Annotated[int, typer.Option(min=0, help="Seed.")] = 0,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="Folder of a benchmark, whose settings and own drivers it has.")
+    ] = None,
     video: Annotated[Path | None, typer.Option(help="MP4 to write.")] = None,
 ) -> None:
-    """Run one episode of the benchmark in the single environment, and show its metrics or its video."""
-    from shared_control_env.evaluation.replay import record, replay_episode
+    """Run one episode of the benchmark again, and show its metrics or its video."""
+    from shared_control_env.evaluation.replay import entries_of, record, replay_episode
 
-    try:
+    console = Console()
+    place = None if video is None else _checked_video(video)
+    with _in_words(console):
         choose("scenario", scenario, CASES)
         choose("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
-        entries = choose("driver", driver, DRIVERS)[driver], choose("authority", authority, AUTHORITIES)[authority]
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from None
-    if video is not None and video.suffix != ".mp4":
-        raise typer.BadParameter(f"video = {video} must end with .mp4")
-    if video is not None and video.exists():
-        raise typer.BadParameter(f"{video} exists already; choose another name")
-    given = None if degradation == AS_GIVEN else degradation
-    frames: list[Any] | None = None if video is None else []
-    measured = replay_episode(scenario, (driver, entries[0]), (authority, entries[1]), given, seed, frames)
-    console = Console()
+        if source is None:
+            first, second = (
+                choose("driver", driver, DRIVERS)[driver],
+                choose("authority", authority, AUTHORITIES)[authority],
+            )
+            config: Any = {}
+        else:
+            first, second, config = entries_of(source.expanduser(), driver, authority)
+        given = None if degradation == AS_GIVEN else degradation
+        frames: list[Any] | None = None if video is None else []
+        measured = replay_episode(scenario, (driver, first), (authority, second), given, seed, frames, config)
     table = Table("metric", "value", "unit", title=f"{scenario}, {degradation}, {driver}, {authority}, seed {seed}")
     for name, value in measured.items():
         table.add_row(name, f"{value:.4g}", METRICS[name].unit)
     console.print(table)
-    if video is not None and frames is not None:
-        record(frames, video)
+    if place is not None and frames is not None:
+        record(frames, place)
         console.print(f"The video is {video}.")
+
+
+def _checked_video(path: Path) -> Path:
+    """Where a video can be written and nothing is yet, found out before its episode is driven."""
+    place = path.expanduser()
+    if place.suffix.lower() != ".mp4":
+        raise typer.BadParameter(f"video = {path} must be a name that ends with .mp4, such as drive.mp4")
+    if place.exists():
+        raise typer.BadParameter(f"{path} exists already; choose another name")
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.touch(exist_ok=False)
+        place.unlink()
+    except OSError as error:
+        raise typer.BadParameter(f"video = {path} cannot be written: {error.strerror or error}") from None
+    return place
 
 
 @app.command(name="list")

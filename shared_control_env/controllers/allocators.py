@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import exp, inf
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -34,6 +34,25 @@ class Allocator(Protocol):
             alpha_a, finite; clipped to [0, 1] by the caller.
         """
         ...
+
+
+def checked_authority(alpha_a: Any, who: str = "allocator") -> float:
+    """What an allocator's ``allocate`` gave as a number; an array of one number is one, as a policy's prediction.
+
+    Args:
+        alpha_a: the authority.
+        who: for the message.
+
+    Raises:
+        ValueError: if it is not one finite number.
+    """
+    try:
+        array = np.asarray(alpha_a, dtype=float)
+    except (TypeError, ValueError):
+        array = np.full(0, np.nan)
+    if array.size != 1 or not np.isfinite(array).all():
+        raise ValueError(f"{who}: allocate() gave {alpha_a!r}; it must give one finite number alpha_a in [0, 1]")
+    return array.item()
 
 
 class FixedAuthority:

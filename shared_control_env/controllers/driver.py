@@ -15,6 +15,9 @@ from shared_control_env.core.condensing import WORKSPACE
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import pack
 
+KEPT = 1000
+"""Programs that a predictive driver remembers for its copies, 2 kB each; its solver begins anew after as many."""
+
 
 @runtime_checkable
 class Driver(Protocol):
@@ -45,11 +48,34 @@ class Driver(Protocol):
         ...
 
 
+def checked_command(command: Any, who: str = "driver") -> np.ndarray:
+    """What a driver's ``act`` gave as an array.
+
+    Args:
+        command: anything with two numbers, ``[a, delta]`` [m/s^2, rad].
+        who: for the message.
+
+    Returns:
+        Shape (2,).
+
+    Raises:
+        ValueError: if it is not two finite numbers.
+    """
+    try:
+        array = np.asarray(command, dtype=float)
+    except (TypeError, ValueError):
+        array = np.full(0, np.nan)
+    if array.shape != (2,) or not np.isfinite(array).all():
+        raise ValueError(f"{who}: act() gave {command!r}; it must give finite [a, delta] [m/s^2, rad], shape (2,)")
+    return array
+
+
 class PredictiveDriver:
     """The driver of Eq. 14-15: the automation's costs without the potential field, linearised, in OSQP.
 
     The workspace is set up at every reset, so that episodes do not depend on those before, and updated in
-    place at every step. Where OSQP does not solve to tolerance the last feasible command is held.
+    place at every step; anew after :data:`KEPT` steps. Where OSQP does not solve to tolerance the last feasible command
+    is held.
 
     Args:
         parameters: the environment's parameters; defaults to the paper's.
@@ -84,9 +110,10 @@ class PredictiveDriver:
         self.solution: Solution | None = None
         self._last = np.zeros(2)
         self._solver: osqp.OSQP | None = None
+        self._problems: list[tuple[np.ndarray, ...]] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """State for copies; OSQP's workspace cannot be copied, so a copy sets up its own, from a cold start."""
+        """State for copies. OSQP's workspace cannot be copied: a copy solves the same programs again at first."""
         return {**self.__dict__, "_solver": None}
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
@@ -107,12 +134,7 @@ class PredictiveDriver:
         single.build_program(
             scene, self._last, self._parameters, self._work, self.P, self.q, self.A, self.low, self.high
         )
-        P, A = self.P[self._P_rows, self._P_columns], self.A[self._A_rows, self._A_columns]
-        if self._solver is None:
-            self._solver = self._set_up(P, A)
-        else:
-            self._solver.update(q=self.q, l=self.low, u=self.high, Px=P, Ax=A)
-        result = self._solver.solve(raise_error=False)
+        result = self._solved()
         info = result.info
         found = info.status_val == osqp.SolverStatus.OSQP_SOLVED and bool(np.isfinite(result.x[:2]).all())
         if found:
@@ -129,16 +151,36 @@ class PredictiveDriver:
             time=perf_counter() - begin,
         )
 
-    def _set_up(self, P: np.ndarray, A: np.ndarray) -> osqp.OSQP:
+    def _solved(self) -> Any:
+        """OSQP's result of the present program, from where it ended with those before."""
+        if len(self._problems) == KEPT:
+            self._solver = None
+            self._problems.clear()
+        P, A = self.P[self._P_rows, self._P_columns], self.A[self._A_rows, self._A_columns]
+        self._problems.append((P, A, self.q.copy(), self.low.copy(), self.high.copy()))
+        if self._solver is not None:
+            return self._advance(*self._problems[-1])
+        self._solver = self._set_up(*self._problems[0])
+        result = self._solver.solve(raise_error=False)
+        for problem in self._problems[1:]:  # of a copy
+            result = self._advance(*problem)
+        return result
+
+    def _advance(self, P: np.ndarray, A: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray) -> Any:
+        assert self._solver is not None
+        self._solver.update(q=q, l=low, u=high, Px=P, Ax=A)
+        return self._solver.solve(raise_error=False)
+
+    def _set_up(self, P: np.ndarray, A: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray) -> osqp.OSQP:
         """OSQP workspace with the full pattern; rho adapts by iterations, not by time, so that runs repeat."""
         self._P_pattern.data, self._A_pattern.data = P, A
         solver = osqp.OSQP()
         solver.setup(
             P=self._P_pattern,
-            q=self.q,
+            q=q,
             A=self._A_pattern,
-            l=self.low,
-            u=self.high,
+            l=low,
+            u=high,
             eps_abs=self._eps,
             eps_rel=self._eps,
             max_iter=4000,

@@ -106,8 +106,8 @@ class SharedControlEnv(HighwayEnv):
         if told and settings.policy_frequency != self.settings.policy_frequency:
             raise ValueError(
                 f"config['policy_frequency'] = {settings.policy_frequency} Hz: pictures of this environment are taken "
-                f"at {self.settings.policy_frequency} Hz, which a video's recorder cannot be told to change; make a new "
-                "environment, or hand the recorder to set_record_video_wrapper()"
+                f"at {self.settings.policy_frequency} Hz, which a video's recorder cannot be told to change; make a "
+                "new environment, or hand the recorder to set_record_video_wrapper()"
             )
 
     def define_spaces(self) -> None:
@@ -119,7 +119,7 @@ class SharedControlEnv(HighwayEnv):
             self.action_space = self.action_type.space()
 
     def update_metadata(self, video_real_time_ratio: float = 1.0) -> None:
-        """Frame rate at which videos run at the speed of the drive: of decisions, or of simulation steps if recorded."""
+        """Frame rate at which videos run at the speed of the drive: one frame a decision, or a simulation step."""
         frequency = self.settings.policy_frequency
         if self._record_video_wrapper is not None:
             frequency = self.settings.simulation_frequency

@@ -72,6 +72,11 @@ class Clipping:
             )
 
 
+def as_array(value: Any) -> Any:
+    """A tensor of PyTorch as an array of NumPy, which NumPy by itself warns of; anything else as it is."""
+    return value.detach().cpu().numpy() if hasattr(value, "detach") else value
+
+
 def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
     """A slot's value as an array within its bounds.
 
@@ -85,7 +90,7 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
     """
     low, high, size = _BOUNDS[slot]
     try:
-        array = np.array(value, dtype=np.float64)
+        array = np.array(as_array(value), dtype=np.float64)
     except (TypeError, ValueError):
         array = np.full(0, np.nan)
     values = array.tolist()

@@ -9,6 +9,7 @@ from shared_control_env.evaluation.catalogue import (
     Suite,
 )
 from shared_control_env.evaluation.metrics import METRICS, Metric, Trajectory
+from shared_control_env.evaluation.replay import replay_episode
 from shared_control_env.evaluation.runner import evaluate
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     "Suite",
     "Trajectory",
     "evaluate",
+    "replay_episode",
 ]

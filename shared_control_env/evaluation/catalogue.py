@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from shared_control_env.controllers.allocators import (
     Allocator,
@@ -22,11 +21,16 @@ from shared_control_env.controllers.scripted import (
     OverreactingDriver,
     ScriptedDriver,
 )
+from shared_control_env.core.authority import LAWS
 from shared_control_env.core.parameters import IDENTIFIED_DRIVERS
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.nearest import hint, nearest
 
 T = TypeVar("T")
+
+Drivers: TypeAlias = "str | Iterable[str] | Mapping[str, DriverEntry | Callable[[], Driver]]"
+Authorities: TypeAlias = "str | Iterable[str] | Mapping[str, AuthorityEntry | Callable[[], Allocator]]"
 
 
 class DriverEntry(NamedTuple):
@@ -35,12 +39,14 @@ class DriverEntry(NamedTuple):
     Attributes:
         description: in a line.
         make: makes one for each environment; None for the paper's predictive driver, which the kernel runs.
-        config: changes to the environment's settings, such as the lag.
+        config: changes to the environment's settings that belong to the driver, such as the lag.
+        fingerprint: tells this driver from others of the same name; None to have it made of its code and arguments.
     """
 
     description: str
     make: Callable[[], Driver] | None = None
     config: Mapping[str, Any] = {}
+    fingerprint: str | None = None
 
 
 class AuthorityEntry(NamedTuple):
@@ -50,11 +56,13 @@ class AuthorityEntry(NamedTuple):
         description: in a line.
         law: one of :data:`core.authority.LAWS`.
         make: makes one for each environment; None for the paper's fuzzy inference, which the kernel runs.
+        fingerprint: tells this authority from others of the same name; None to have it made of its code and arguments.
     """
 
     description: str
     law: str
     make: Callable[[], Allocator] | None = None
+    fingerprint: str | None = None
 
 
 class Suite(NamedTuple):
@@ -115,18 +123,91 @@ def choose(what: str, given: str | Iterable[str] | Mapping[str, Any], known: Map
 
     Args:
         what: word for messages, such as ``driver``.
-        given: a name, several, or a mapping of names to entries.
+        given: a name, several, ``all``, or a mapping of names to entries.
         known: the catalogue.
 
     Raises:
-        ValueError: for an unknown name, listing the valid ones and the nearest.
+        ValueError: for an unknown name, listing the valid ones and the nearest; for none at all, or what is no name.
     """
     if isinstance(given, Mapping):
-        return dict(given)
-    names = [given] if isinstance(given, str) else list(given)
-    for name in names:
-        if name not in known:
-            near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.4)
-            hint = f"did you mean {near[0]!r}? " if near else ""
-            raise ValueError(f"{what} = {name!r} is not known; {hint}valid are {', '.join(known)}")
-    return {name: known[name] for name in names}
+        entries = dict(given)
+    elif given == "all":
+        return dict(known)
+    else:
+        if not isinstance(given, Iterable):
+            raise ValueError(f"{what} = {given!r} must be a name, several, or a mapping of names to what makes one")
+        entries = dict.fromkeys([given] if isinstance(given, str) else given)
+    if not entries:
+        raise ValueError(f"{what} = {given!r} names nothing; valid are {', '.join(known)}")
+    for name in entries:
+        if not isinstance(name, str) or not name:
+            raise ValueError(f"{what} = {name!r} must be a name, which is a text that is not empty")
+        if not isinstance(given, Mapping) and name not in known:
+            near = nearest(name, known)
+            suggestion = f"did you mean {near!r}? " if near else ""
+            raise ValueError(f"{what} = {name!r} is not known; {suggestion}valid are {', '.join(known)}")
+    return entries if isinstance(given, Mapping) else {name: known[name] for name in entries}
+
+
+def chosen_drivers(given: Drivers) -> dict[str, DriverEntry]:
+    """Drivers by name, each made once to see that it is one.
+
+    Raises:
+        ValueError: as :func:`choose`; or for what makes no driver.
+    """
+    entries = {}
+    for name, entry in choose("driver", given, DRIVERS).items():
+        made = entry if isinstance(entry, DriverEntry) else DriverEntry("given by the user", entry)
+        if not isinstance(made.config, Mapping):
+            raise ValueError(f"driver {name!r} has config = {made.config!r}, which must be a dict")
+        _check_maker("driver", name, made.make, Driver, "reset(seed) and act(observation, scene)")
+        entries[name] = made
+    return entries
+
+
+def chosen_authorities(given: Authorities) -> dict[str, AuthorityEntry]:
+    """Authorities by name, each allocator made once to see that it is one.
+
+    Raises:
+        ValueError: as :func:`choose`; or for what makes no allocator, or an unknown law.
+    """
+    entries = {}
+    for name, entry in choose("authority", given, AUTHORITIES).items():
+        made = (
+            entry if isinstance(entry, AuthorityEntry) else AuthorityEntry("given by the user", "proportional", entry)
+        )
+        if made.law not in LAWS:
+            raise ValueError(f"authority {name!r} has law = {made.law!r}; {hint(made.law, LAWS)}")
+        _check_maker("authority", name, made.make, Allocator, "reset(seed) and allocate(scene, signals)")
+        entries[name] = made
+    return entries
+
+
+def _check_maker(what: str, name: str, make: Any, kind: Any, methods: str) -> None:
+    """Raise ValueError unless calling ``make`` gives an object of a kind."""
+    if make is None:
+        return
+    if not callable(make):
+        raise ValueError(
+            f"{what} {name!r} is {make!r}; it must be what makes one for each episode, such as a class, not one itself"
+        )
+    made = make()
+    if isinstance(made, type) or not isinstance(made, kind):
+        raise ValueError(f"{what} {name!r}: {make!r} makes {made!r}, which is no object with {methods}")
+
+
+def chosen_suite(suite: str | Suite) -> Suite:
+    """A suite by name, or a user's own, its names checked.
+
+    Raises:
+        ValueError: for an unknown suite, scenario or degradation, with the nearest, or an empty suite.
+    """
+    if not isinstance(suite, Suite):
+        return next(iter(choose("suite", suite, SUITES).values()))
+    choose("scenario", suite.scenarios, CASES)
+    if not isinstance(suite.degradations, Iterable) or isinstance(suite.degradations, str) or not suite.degradations:
+        raise ValueError(f"degradations = {suite.degradations!r} of the suite must be several names, or None")
+    named = [name for name in suite.degradations if name is not None]
+    if named:
+        choose("degradation", named, DEGRADATIONS)
+    return suite

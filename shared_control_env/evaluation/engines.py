@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context, parent_process
+from threading import Thread
 from typing import Any
 
 from shared_control_env.evaluation.episodes import Batch, run
@@ -15,6 +18,10 @@ ATTEMPTS = 3
 """Times that Ray starts a batch again whose worker was lost."""
 
 
+class WorkersLostError(RuntimeError):
+    """Processes were killed, or could not begin."""
+
+
 def serial(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Rows]]:
     """One batch after the other, here."""
     for batch in batches:
@@ -22,26 +29,49 @@ def serial(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Rows]]:
 
 
 def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows]]:
-    """Batches in some processes, as they are done.
+    """Batches in some processes, as they are done; the processes end with this one, even if it is killed.
 
     The first batch of either kind, with the driver in the kernel and without, runs here, so that what it compiles is
     in the cache before the processes look for it.
 
     Raises:
-        concurrent.futures.process.BrokenProcessPool: if a process was killed.
+        WorkersLostError: if a process was killed, or could not begin.
     """
     first: dict[bool, Batch] = {}
     for batch in batches:
         first.setdefault(batch.driver[1].make is None, batch)
     yield from serial(list(first.values()))
     rest = [batch for batch in batches if batch not in first.values()]
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(run, batch): batch for batch in rest}
+    with worker_pool(jobs) as pool:
         try:
+            futures = {pool.submit(run, batch): batch for batch in rest}
             for future in as_completed(futures):
                 yield futures[future], future.result()
+        except BrokenProcessPool:
+            raise WorkersLostError(
+                f"jobs = {jobs}: a process was killed, or could not begin. Processes import the program that starts "
+                'them: in a script, call evaluate() under if __name__ == "__main__":, and give drivers and allocators '
+                "that are defined in a file and not at a prompt or in a notebook"
+            ) from None
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+def worker_pool(jobs: int) -> ProcessPoolExecutor:
+    """Processes that end with the one that starts them, however that ends."""
+    return ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """Watch the parent in a thread: one that is killed tells nobody, and its workers would wait for it for ever."""
+    parent = parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def ray_cluster(batches: Sequence[Batch], jobs: int, address: str | None = None) -> Iterator[tuple[Batch, Rows]]:

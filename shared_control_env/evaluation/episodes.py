@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import shared_control_env
-from shared_control_env.controllers.allocators import Allocator
-from shared_control_env.controllers.driver import Driver
+from shared_control_env.controllers.allocators import Allocator, checked_authority
+from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.longitudinal_risk import PRECEDING
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
 from shared_control_env.envs.cases import CASES
+from shared_control_env.envs.settings.changes import at
 from shared_control_env.envs.situation import TRAFFIC_BODY
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
 from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
@@ -29,7 +30,10 @@ from shared_control_env.vector.environment import SharedControlVectorEnv
 LARGEST_BATCH = 170
 """Episodes that run together at most: large enough for the kernel, small enough to lose little when stopped."""
 
-NOT_IN_THE_NUMBERS = ("report.py", "replay.py", "statistics.py", "storage.py", "graphics.py")
+MOST_SEEDS = 1_000_000
+"""Largest number of seeds of a run."""
+
+NOT_IN_THE_NUMBERS = ("report.py", "replay.py", "statistics.py", "storage.py", "fingerprint.py", "graphics.py")
 """Sources that no result depends on."""
 
 AS_GIVEN = "own"
@@ -54,10 +58,9 @@ class Batch(NamedTuple):
     config: Mapping[str, Any]
 
     @property
-    def name(self) -> str:
-        """Name for files, which says what is in it."""
-        digest = sha256(repr((self.episodes, json.dumps(self.config, sort_keys=True))).encode()).hexdigest()[:8]
-        return f"{self.scenario}-{self.driver[0]}-{self.authority[0]}-{digest}"
+    def key(self) -> str:
+        """Text that says which episodes these are, beside driver and authority."""
+        return json.dumps([self.scenario, self.episodes])
 
 
 def plan(
@@ -78,12 +81,46 @@ def plan(
 
 def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
     """Changes to the scenario's settings for one episode of a batch."""
-    config: dict[str, Any] = {"authority": {"law": batch.authority[1].law}}
-    for changes in (batch.driver[1].config, batch.config):
-        config = _joined(config, changes)
+    own: dict[str, Any] = {"authority": {"law": batch.authority[1].law}}
+    owners = {"authority.law": f"the authority {batch.authority[0]!r}"}
+    for path in _paths(batch.driver[1].config):
+        owners[path] = f"the driver {batch.driver[0]!r}"
+    own = _joined(own, batch.driver[1].config)
     if degradation is not None:
-        config["degradations"] = [degradation]
-    return config
+        own["degradations"] = [degradation]
+        owners["degradations"] = "the suite"
+    _refuse_clashes(owners, own, batch.config)
+    return _joined(own, batch.config)
+
+
+def _paths(changes: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    """Paths of the settings that nested changes name, such as ``driver_lag.K_h``."""
+    for key, value in changes.items():
+        if isinstance(value, Mapping):
+            yield from _paths(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}"
+
+
+def _refuse_clashes(owners: Mapping[str, str], own: Mapping[str, Any], config: Mapping[str, Any]) -> None:
+    """Raise ValueError where a user's config sets or draws what makes a driver, an authority or a suite what it is.
+
+    Args:
+        owners: whose each path is, for the message.
+        own: the settings that they have.
+        config: the user's changes.
+    """
+    given = set(_paths(config))
+    draws = config.get("randomise", ())
+    drawn = {entry.get("setting") for entry in draws if isinstance(entry, Mapping)}
+    for path, owner in owners.items():
+        parts = tuple(path.split("."))
+        same = path in given and at(config, parts) == at(own, parts)
+        if path in drawn or (path in given and not same):
+            raise ValueError(
+                f"config changes {path!r}, which {owner} sets to {at(own, parts)!r}; leave it out, or give an entry of "
+                "your own that has it otherwise"
+            )
 
 
 def _joined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,7 +137,7 @@ def source_digest() -> str:
     """Digest of the sources that the numbers come from, so that those of a changed checkout are told apart."""
     digest = sha256()
     for folder in ("core", "controllers", "envs", "vector", "evaluation"):
-        for path in sorted((Path(shared_control_env.__file__).parent / folder).glob("*.py")):
+        for path in sorted((Path(shared_control_env.__file__).parent / folder).rglob("*.py")):
             if path.name not in NOT_IN_THE_NUMBERS:
                 digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
@@ -113,7 +150,7 @@ def versions() -> str:
     return ", ".join(["python " + python_version(), *parts, f"sources {source_digest()}"])
 
 
-def make_environment(batch: Batch) -> SharedControlVectorEnv:
+def make_environment(batch: Batch, render_mode: str | None = None) -> SharedControlVectorEnv:
     """Environment of a batch's episodes, what the kernel can decide bound."""
     return SharedControlVectorEnv(
         CASES[batch.scenario],
@@ -121,6 +158,7 @@ def make_environment(batch: Batch) -> SharedControlVectorEnv:
         config=settings_of(batch, None),
         limiter=batch.authority[1].make is None,
         driver=batch.driver[1].make is None,
+        render_mode=render_mode,
         threads=1,
     )
 
@@ -206,6 +244,7 @@ class Policies:
         limits = env.config["limits"]
         self._limits = np.array([limits["a_max"], limits["delta_max"]])
         make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
+        self._names = f"driver {batch.driver[0]!r}", f"authority {batch.authority[0]!r}"
         self._drivers: list[Driver] = [make_driver() for _ in batch.episodes] if make_driver else []
         self._allocators: list[Allocator] = [make_allocator() for _ in batch.episodes] if make_allocator else []
         for (_, seed), *policies in zip(
@@ -218,25 +257,32 @@ class Policies:
         """Action of all environments: of the slots that the kernel leaves open."""
         action = {}
         if self._drivers:
-            commands = [d.act(o, s) for d, o, s in zip(self._drivers, observations, self._scenes, strict=True)]
+            commands = [
+                checked_command(driver.act(observation, scene), self._names[0])
+                for driver, observation, scene in zip(self._drivers, observations, self._scenes, strict=True)
+            ]
             action[DRIVER] = np.array(commands) / self._limits
         if self._allocators:
             alphas = [
-                a.allocate(scene, signals)
+                checked_authority(a.allocate(scene, signals), self._names[1])
                 for a, scene, signals in zip(self._allocators, self._scenes, self._signals, strict=True)
             ]
             action[AUTHORITY] = np.array(alphas, dtype=float)[:, None]
         return action if len(action) != 1 else next(iter(action.values()))
 
 
-def run(batch: Batch) -> list[dict[str, Any]]:
+def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, Any]]:
     """Run a batch.
+
+    Args:
+        batch: the episodes.
+        frames: pictures of the first episode before every step are appended, where a list is given.
 
     Returns:
         One row an episode: what it is, how it ended, every metric, and what it was made with.
     """
     begin = perf_counter()
-    env = make_environment(batch)
+    env = make_environment(batch, None if frames is None else "rgb_array")
     seeds = [seed for _, seed in batch.episodes]
     changes = {degradation: settings_of(batch, degradation) for degradation, _ in batch.episodes}
     configs = [changes[degradation] for degradation, _ in batch.episodes]
@@ -244,6 +290,8 @@ def run(batch: Batch) -> list[dict[str, Any]]:
     settings, drawn = env.episodes[0], env.episodes
     recorder, policies = Recorder(settings.steps, len(batch.episodes)), Policies(batch, env)
     for k in range(settings.steps):
+        if frames is not None:
+            frames.extend(env.render() or ())
         observations, _, terminations, truncations, infos = env.step(policies.decide(observations))
         if not recorder.note(k, infos, terminations | truncations):
             break

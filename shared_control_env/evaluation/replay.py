@@ -1,31 +1,20 @@
-"""One episode of the benchmark in the single environment: to see it, and to hold the kernel's rows against it."""
+"""One episode of the benchmark again: to see it, from its names or from the folder of a run."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
-from shared_control_env.envs.scenarios import scenario as scenario_class
-from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry
-from shared_control_env.evaluation.episodes import Batch, Recorder, settings_of
-from shared_control_env.evaluation.metrics import measure_all
-from shared_control_env.wrappers import AuthorityLimiter, DriverModel
-
-
-def make_single(batch: Batch, degradation: str | None, render_mode: str | None = None) -> gym.Env:
-    """The single environment of a batch's episode, with its driver and its authority.
-
-    The kernel's predictive driver is solved by OSQP here, to its tolerance of 1e-5.
-    """
-    make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
-    config = settings_of(batch, degradation)
-    env: gym.Env = scenario_class(batch.scenario)(config, render_mode=render_mode)
-    env = AuthorityLimiter(env, make_allocator() if make_allocator else None)
-    return DriverModel(env, make_driver() if make_driver else None)
+from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose
+from shared_control_env.evaluation.episodes import Batch, run
+from shared_control_env.evaluation.fingerprint import fingerprint
+from shared_control_env.evaluation.metrics import METRICS
+from shared_control_env.evaluation.storage import read_manifest
 
 
 def replay_episode(
@@ -35,42 +24,69 @@ def replay_episode(
     degradation: str | None,
     seed: int,
     frames: list[np.ndarray] | None = None,
+    config: Mapping[str, Any] | None = None,
 ) -> dict[str, float]:
-    """Run one episode.
+    """Run one episode, as the benchmark runs it.
 
     Args:
         scenario, driver, authority, degradation, seed: as in the benchmark's table; no degradation for the
             scenario's own.
         frames: pictures of every step are appended, where a list is given.
+        config: changes to the scenario's settings, those of the benchmark.
 
     Returns:
         Its metrics.
     """
-    batch = Batch(scenario, driver, authority, ((degradation, seed),), {})
-    env = make_single(batch, degradation, None if frames is None else "rgb_array")
-    begin = perf_counter()
-    env.reset(seed=seed)
-    settings = env.unwrapped.episode  # type: ignore[attr-defined]
-    recorder, going = Recorder(settings.steps, 1), True
-    k = 0
-    while going:
-        if frames is not None:
-            frames.append(env.render())  # type: ignore[arg-type]
-        _, _, terminated, truncated, info = env.step(0)
-        going = recorder.note(k, _batched(info), np.array([terminated or truncated]))
-        k += 1
-    env.close()
-    return measure_all(recorder.trajectory(0, settings, perf_counter() - begin))
+    (row,) = run(Batch(scenario, driver, authority, ((degradation, seed),), config or {}), frames)
+    return {name: row[name] for name in METRICS}
 
 
-def _batched(info: dict[str, Any]) -> dict[str, Any]:
-    """The info of one environment in the form of many."""
-    return {k: _batched(v) if isinstance(v, dict) else np.asarray(v)[None] for k, v in info.items()}
+def entries_of(folder: Path, driver: str, authority: str) -> tuple[DriverEntry, AuthorityEntry, Mapping[str, Any]]:
+    """A driver, an authority and the config of the benchmark that a folder holds.
+
+    A user's own class is imported by its path, as from the present folder.
+
+    Raises:
+        ValueError: if the folder has no such names, or a class is not found any more or has changed.
+    """
+    manifest = read_manifest(folder)
+    known = (
+        choose("driver", driver, manifest["drivers"])[driver],
+        choose("authority", authority, manifest["authorities"])[authority],
+    )
+    first: Any = DRIVERS.get(driver) if known[0]["origin"] == "catalogue" else None
+    second: Any = AUTHORITIES.get(authority) if known[1]["origin"] == "catalogue" else None
+    first = first or DriverEntry("given by the user", _make("driver", driver, known[0]), known[0]["config"])
+    second = second or AuthorityEntry("given by the user", known[1]["law"], _make("authority", authority, known[1]))
+    return first, second, manifest["config"]
 
 
-def record(frames: list[np.ndarray], path: Path, fps: int = 20) -> None:
+def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:
+    """What makes a user's driver or allocator, imported."""
+    if described["origin"] is None:
+        raise ValueError(
+            f"{what} {name!r} is of the program that ran the benchmark and cannot be imported; replay its episodes "
+            "there, by shared_control_env.evaluation.replay_episode"
+        )
+    module, _, path = described["origin"].partition(":")
+    if str(Path.cwd()) not in sys.path:
+        sys.path.insert(0, str(Path.cwd()))
+    try:
+        found: Any = import_module(module)
+        for part in path.split("."):
+            found = getattr(found, part)
+    except (ImportError, AttributeError) as error:
+        raise ValueError(f"{what} {name!r} is {described['origin']}, which cannot be imported: {error}") from None
+    if fingerprint(found) != described["fingerprint"]:
+        raise ValueError(
+            f"{what} {name!r}: {described['origin']} has changed since; its old episodes cannot be replayed"
+        )
+    return found
+
+
+def record(frames: Sequence[np.ndarray], path: Path, fps: int = 20) -> None:
     """Write frames as an MP4 at the speed of the drive."""
     from moviepy import ImageSequenceClip
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    ImageSequenceClip(frames, fps=fps).write_videofile(str(path), logger=None)
+    ImageSequenceClip(list(frames), fps=fps).write_videofile(str(path), logger=None)

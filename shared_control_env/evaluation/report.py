@@ -23,6 +23,7 @@ from shared_control_env.evaluation.storage import write_atomically
 
 if TYPE_CHECKING:
     from shared_control_env.evaluation.metrics import Metric
+    from shared_control_env.evaluation.storage import ResultsFolder
 
 SHOWN = ("lateral_rms", "driver_effort", "conflict", "false_authority_loss")
 """Metrics of the plots, as far as the table has them."""
@@ -84,7 +85,11 @@ class Row(NamedTuple):
 
 
 def write_report(
-    table: pd.DataFrame, metrics: Mapping[str, Metric], path: Path, provenance: Mapping[str, object]
+    table: pd.DataFrame,
+    metrics: Mapping[str, Metric],
+    path: Path,
+    provenance: Mapping[str, object],
+    folder: ResultsFolder | None = None,
 ) -> None:
     """Write the report.
 
@@ -93,6 +98,7 @@ def write_report(
         metrics: its metrics.
         path: of the HTML file.
         provenance: what the results are of and were made with, shown as it is.
+        folder: that holds the results, which the commands that run an episode again read.
     """
     environment = Environment(loader=PackageLoader("shared_control_env.evaluation", "."), autoescape=True)
     environment.filters["number"] = _number
@@ -104,7 +110,7 @@ def write_report(
         rows=rows,
         provenance=provenance,
         plots=draw_plots(table, rows, metrics) if len(table) else [],
-        gallery=gallery(table),
+        gallery=gallery(table, folder),
     )
     write_atomically(path, lambda draft: draft.write_text(page, encoding="utf-8"))
 
@@ -156,8 +162,13 @@ def _number(value: float) -> str:
     return "–" if not np.isfinite(value) else f"{value:.3g}"
 
 
-def gallery(table: pd.DataFrame) -> list[dict[str, Any]]:
-    """The worst failed episodes, spread over all that names them, with the command that shows each again."""
+def gallery(table: pd.DataFrame, folder: ResultsFolder | None = None) -> list[dict[str, Any]]:
+    """The worst failed episodes, spread over all that names them, with the command that shows each again.
+
+    Args:
+        table: one row an episode.
+        folder: that holds the results, for the command.
+    """
     names = ["scenario", "degradation", "driver", "authority", "seed"]
     failed = table[table["terminated"].astype(bool)] if len(table) else table
     chosen = _spread(_worst_first(failed), names[:-1], GALLERY) if len(failed) else failed
@@ -166,12 +177,20 @@ def gallery(table: pd.DataFrame) -> list[dict[str, Any]]:
             **{name: row[name] for name in names},
             "what": "collision" if row.get("collisions", 0.0) > 0.0 else "off the road",
             "when": row.get("duration", np.nan),
-            "command": shlex.join(
-                ["shared-control", "replay", *(part for name in names for part in (f"--{name}", str(row[name])))]
-            ),
+            "command": _command({name: str(row[name]) for name in names}, folder),
         }
         for row in chosen.to_dict("records")
     ]
+
+
+def _command(episode: Mapping[str, str], folder: ResultsFolder | None) -> str:
+    """How an episode is run again: a command, or what to do where the driver or authority cannot be found by one."""
+    for part, what in (("drivers", "driver"), ("authorities", "authority")) if folder is not None else ():
+        if folder.manifest[part][episode[what]]["origin"] is None:  # type: ignore[union-attr]
+            return f"by evaluation.replay_episode, in the program that has the {what} {episode[what]!r}"
+    source = [] if folder is None else ["--from", str(folder.path)]
+    parts = [part for name, value in episode.items() for part in (f"--{name}", value)]
+    return shlex.join(["shared-control", "replay", *source, *parts])
 
 
 def _worst_first(failed: pd.DataFrame) -> pd.DataFrame:

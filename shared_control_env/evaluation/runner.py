@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
+import json
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
-from shared_control_env.controllers.allocators import Allocator
-from shared_control_env.controllers.driver import Driver
+from shared_control_env.envs.cases import CASES
+from shared_control_env.envs.seeds import checked_seed
+from shared_control_env.envs.settings import as_plain
 from shared_control_env.evaluation import engines
 from shared_control_env.evaluation.catalogue import (
     AUTHORITIES,
     DRIVERS,
-    SUITES,
+    Authorities,
     AuthorityEntry,
     DriverEntry,
+    Drivers,
     Suite,
     choose,
+    chosen_authorities,
+    chosen_drivers,
+    chosen_suite,
 )
-from shared_control_env.evaluation.episodes import Batch, plan, versions
-from shared_control_env.evaluation.storage import REPORT, TABLE, ResultsFolder, sorted_table, write_atomically
+from shared_control_env.evaluation.episodes import MOST_SEEDS, Batch, plan, settings_of, versions
+from shared_control_env.evaluation.fingerprint import fingerprint
+from shared_control_env.evaluation.storage import MAY_GROW, REPORT, TABLE, ResultsFolder, sorted_table, write_atomically
+from shared_control_env.vector.environment import settings_for_kernel
 
 ENGINES = ("local", "ray")
 """Names of the engines."""
-
-Drivers = str | Iterable[str] | Mapping[str, DriverEntry | Callable[[], Driver]]
-Authorities = str | Iterable[str] | Mapping[str, AuthorityEntry | Callable[[], Allocator]]
 
 
 def evaluate(
@@ -46,18 +52,21 @@ def evaluate(
     """Run every episode of a suite with every driver under every authority.
 
     Args:
-        driver: a name of :data:`catalogue.DRIVERS`, several, or your own: a mapping of names to whatever makes a
-            :class:`~shared_control_env.controllers.driver.Driver`, such as its class.
+        driver: a name of :data:`catalogue.DRIVERS`, several, ``all``, or your own: a mapping of names to whatever makes
+            a :class:`~shared_control_env.controllers.driver.Driver`, such as its class; ``act`` gives m/s^2 and rad.
         authority: the same of :data:`catalogue.AUTHORITIES`; your own
             :class:`~shared_control_env.controllers.allocators.Allocator` acts by the law ``proportional`` unless
             given as an :class:`AuthorityEntry`.
         suite: a name of :data:`catalogue.SUITES`, or your own.
         seeds: of the episodes; one seed gives every driver and authority the same episode.
-        config: changes to the settings of all scenarios.
+        config: changes to the settings of all scenarios. What makes an entry what it is, such as the lag of ``mpc_1``,
+            cannot be changed.
         out: folder to keep the results in, as they come; a run that was stopped goes on from there. With it
-            ``episodes.parquet`` and ``report.html`` are written at the end.
-        fresh: replace what the folder holds of another benchmark.
-        jobs: processes.
+            ``episodes.parquet`` and ``report.html`` are written at the end. Where a driver or an allocator of your own
+            has changed its episodes are run again.
+        fresh: remove the results of another benchmark that the folder holds.
+        jobs: processes. They import the program that starts them: a script calls this under
+            ``if __name__ == "__main__":``, and your own drivers must be picklable by name, so not of a notebook.
         engine: ``local``, or ``ray`` for the Ray cluster that is connected, or one started here.
         progress: called with the number of episodes done and of all.
 
@@ -66,41 +75,90 @@ def evaluate(
         duration [s], every metric of :data:`metrics.METRICS`, digest of its settings, versions.
 
     Raises:
-        ValueError: for unknown names, naming the nearest and all valid ones, or a folder of another benchmark.
+        ValueError: for unknown names, naming the nearest and all valid ones; for what makes no driver or allocator, or
+            settings that do not go together; or for a folder of another benchmark. All of it before anything is run.
     """
-    drivers = {name: _driver_entry(entry) for name, entry in choose("driver", driver, DRIVERS).items()}
-    authorities = {name: _authority_entry(e) for name, e in choose("authority", authority, AUTHORITIES).items()}
-    chosen = suite if isinstance(suite, Suite) else choose("suite", suite, SUITES)[suite]
-    numbers = list(seeds)
-    if jobs < 1:
-        raise ValueError(f"jobs = {jobs} must be at least 1")
+    drivers, authorities, chosen = chosen_drivers(driver), chosen_authorities(authority), chosen_suite(suite)
+    numbers = _checked_seeds(seeds)
+    if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
+        raise ValueError(f"jobs = {jobs!r} must be an integer of at least 1")
     choose("engine", engine, dict.fromkeys(ENGINES))
-    batches = list(plan(chosen, drivers, authorities, numbers, config or {}))
+    if config is not None and not isinstance(config, Mapping):
+        raise ValueError(f"config = {config!r} must be a dict")
+    changes = as_plain(config or {})
+    batches = list(plan(chosen, drivers, authorities, numbers, changes))
+    _check_settings(batches)
     if out is None:
         done = [row for _, rows in _progressing(_run(batches, jobs, engine), batches, 0, progress) for row in rows]
         return sorted_table(pd.DataFrame(done))
     manifest = {
         "suite": suite if isinstance(suite, str) else chosen._asdict(),
         "seeds": numbers,
-        "drivers": list(drivers),
-        "authorities": list(authorities),
-        "config": dict(config or {}),
+        "config": changes,
         "versions": versions(),
+        "drivers": {name: _described("driver", name, entry, DRIVERS) for name, entry in drivers.items()},
+        "authorities": {name: _described("authority", name, entry, AUTHORITIES) for name, entry in authorities.items()},
     }
-    folder = ResultsFolder(Path(out), manifest, fresh)
-    missing = [batch for batch in batches if not folder.has(batch.name)]
-    found = sum(len(batch.episodes) for batch in batches) - sum(len(batch.episodes) for batch in missing)
-    for batch, rows in _progressing(_run(missing, jobs, engine), batches, found, progress):
-        folder.add(batch.name, rows)
-    return _finish(folder, manifest)
+    folder = ResultsFolder(Path(out).expanduser(), manifest, fresh)
+    try:
+        for notice in folder.notices:
+            warnings.warn(notice, stacklevel=2)
+        missing = [batch for batch in batches if not folder.has(batch.driver[0], batch.authority[0], batch.key)]
+        found = sum(len(batch.episodes) for batch in batches) - sum(len(batch.episodes) for batch in missing)
+        for batch, rows in _progressing(_run(missing, jobs, engine), batches, found, progress):
+            folder.add(batch.driver[0], batch.authority[0], batch.key, rows)
+        return _finish(folder)
+    finally:
+        folder.close()
 
 
-def _driver_entry(entry: DriverEntry | Callable[[], Driver]) -> DriverEntry:
-    return entry if isinstance(entry, DriverEntry) else DriverEntry("given by the user", entry)
+def _checked_seeds(seeds: Iterable[int]) -> list[int]:
+    """Seeds as integers that a table's column holds, each once."""
+    if not isinstance(seeds, Iterable) or isinstance(seeds, str | bytes):
+        raise ValueError(f"seeds = {seeds!r} must be several integers, such as range(10)")
+    numbers: dict[int, None] = {}
+    for seed in seeds:
+        number = checked_seed(seed, "seeds: an entry")
+        if number is None or number >= 2**63:
+            raise ValueError(f"seeds: an entry = {seed!r} must be an integer in [0, {2**63 - 1}]")
+        numbers[number] = None
+        if len(numbers) > MOST_SEEDS:
+            raise ValueError(f"seeds has more than {MOST_SEEDS} entries, the largest number of them")
+    if not numbers:
+        raise ValueError("seeds is empty; it must hold at least one integer")
+    return list(numbers)
 
 
-def _authority_entry(entry: AuthorityEntry | Callable[[], Allocator]) -> AuthorityEntry:
-    return entry if isinstance(entry, AuthorityEntry) else AuthorityEntry("given by the user", "proportional", entry)
+def _check_settings(batches: Sequence[Batch]) -> None:
+    """Raise what would keep an episode from being run, before any is."""
+    seen = set()
+    for batch in batches:
+        config = settings_of(batch, batch.episodes[0][0])
+        key = batch.scenario, json.dumps(config, sort_keys=True, default=repr)
+        if key not in seen:
+            seen.add(key)
+            settings_for_kernel(CASES[batch.scenario], config)
+
+
+def _described(
+    what: str, name: str, entry: DriverEntry | AuthorityEntry, known: Mapping[str, DriverEntry | AuthorityEntry]
+) -> dict[str, Any]:
+    """What a folder remembers of an entry: whether it is the same, and how it is found again.
+
+    ``origin`` is ``catalogue``, the path ``module:name`` of a class or function, or None where there is no such path.
+    """
+    own: dict[str, Any] = (
+        {"law": entry.law} if isinstance(entry, AuthorityEntry) else {"config": as_plain(entry.config)}
+    )
+    if known.get(name) is entry:
+        return {"origin": "catalogue", "fingerprint": None, **own}
+    module, path = getattr(entry.make, "__module__", None), getattr(entry.make, "__qualname__", None)
+    found = module not in (None, "__main__", "__mp_main__") and path is not None and "<" not in path
+    try:
+        print_ = entry.fingerprint or (None if entry.make is None else fingerprint(entry.make))
+    except ValueError as error:
+        raise ValueError(f"{what} {name!r}: {error}") from None
+    return {"origin": f"{module}:{path}" if found else None, "fingerprint": print_, **own}
 
 
 def _run(batches: Sequence[Batch], jobs: int, engine: str) -> Iterator[tuple[Batch, engines.Rows]]:
@@ -125,12 +183,13 @@ def _progressing(
         report(done, total)
 
 
-def _finish(folder: ResultsFolder, manifest: Mapping[str, Any]) -> pd.DataFrame:
+def _finish(folder: ResultsFolder) -> pd.DataFrame:
     """Write the table and the report."""
     from shared_control_env.evaluation.metrics import METRICS
     from shared_control_env.evaluation.report import write_report
 
     table = folder.table()
     write_atomically(folder.path / TABLE, table.to_parquet)
-    write_report(table, METRICS, folder.path / REPORT, manifest)
+    names = {part: list(folder.manifest[part]) for part in MAY_GROW}
+    write_report(table, METRICS, folder.path / REPORT, {**folder.manifest, **names}, folder)
     return table

@@ -1,14 +1,17 @@
-"""The folder that a benchmark's results grow in: whole files only, and of one benchmark only."""
+"""The folder that a benchmark's results grow in: whole files, of one benchmark, written by one run at a time."""
 
 from __future__ import annotations
 
 import json
-import shutil
+import os
+import re
 from collections.abc import Callable, Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from filelock import FileLock, Timeout
 
 MANIFEST = "benchmark.json"
 """What the results in a folder are of."""
@@ -16,15 +19,31 @@ MANIFEST = "benchmark.json"
 TABLE, REPORT = "episodes.parquet", "report.html"
 """All episodes in one table, and the report on them."""
 
+BATCHES = "episodes"
+"""Folder of the batches' files."""
+
 IDENTITY = ["scenario", "degradation", "driver", "authority", "seed"]
 """Columns that name an episode."""
 
+FORMAT = "shared_control_env benchmark 2"
+"""Says in a manifest what the folder is, and how it is laid out."""
+
 MAY_GROW = ("drivers", "authorities")
-"""Parts of the manifest that a later run may add to; all others must be the same."""
+"""Parts of the manifest that a later run may add to or replace entries of; all others must be the same."""
+
+_LOCK = ".lock"
+_DRAFT = ".draft-"
+_BATCH = re.compile(r"(([0-9a-f]{8})-([0-9a-f]{8})-([0-9a-f]{8})-[0-9a-f]{16})-([0-9a-f]{16})\.parquet")
+"""Name of a batch's file: digests of the benchmark, driver, authority and batch, then of the file's content."""
+
+
+def digest(content: bytes | str, length: int = 16) -> str:
+    """The first digits of the SHA-256 of bytes, or of a text."""
+    return sha256(content.encode() if isinstance(content, str) else content).hexdigest()[:length]
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` fill a file beside the path, then move it there: a kill or a full disk leaves no half a file.
+    """Let ``write`` fill a file beside the path, then move it there: a kill, a full disk or a power cut leaves no half.
 
     Args:
         path: of the file; its folder is made.
@@ -34,72 +53,197 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
         OSError: where it cannot be written; what was there before is still there.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".draft-{path.name}")
+    draft = path.with_name(f"{_DRAFT}{path.name}")
     try:
         write(draft)
+        _flush(draft)
         draft.replace(path)
     except BaseException:
         draft.unlink(missing_ok=True)
         raise
+    _flush(path.parent)
+
+
+def _flush(path: Path) -> None:
+    """Have the disk hold what was written to a file or folder, where the system can."""
+    if path.is_dir() and os.name == "nt":  # which opens no folders
+        return
+    handle = os.open(path, os.O_RDONLY if os.name != "nt" else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 class ResultsFolder:
-    """Results of one benchmark, a file a batch.
+    """Results of one benchmark, a file a batch. It is this run's alone until :meth:`close`.
 
     Args:
         path: the folder; made, or resumed where it holds results of the same benchmark.
-        manifest: what the benchmark is: suite, drivers, authorities, seeds, config and versions.
-        fresh: replace results of another benchmark.
+        manifest: what the benchmark is: suite, seeds, config, versions, and each driver and authority by name.
+        fresh: remove the results of another benchmark; files that are no results stay.
+
+    Attributes:
+        path: the folder.
+        manifest: what it holds the results of.
+        notices: what was found and is worth a line.
 
     Raises:
-        ValueError: if the folder holds something else, naming what differs.
+        ValueError: if the folder holds something else, naming what differs; if another run writes there; or if it
+            cannot be written to.
     """
 
     def __init__(self, path: Path, manifest: Mapping[str, Any], fresh: bool = False) -> None:
-        self.path = path
-        wanted: dict[str, Any] = json.loads(json.dumps(manifest))  # as it will be read again
-        if path.exists() and any(path.iterdir()):
-            there = self._manifest_there()
-            if fresh:
-                shutil.rmtree(path)
-            else:
-                self._check_same(there, wanted)
-                for part in MAY_GROW:
-                    wanted[part] = list(dict.fromkeys([*there[part], *wanted[part]]))
-        text = json.dumps(wanted, indent=1)
-        write_atomically(path / MANIFEST, lambda draft: draft.write_text(text))
-
-    def _manifest_there(self) -> dict[str, Any]:
+        self.path, self.notices = path, list[str]()
+        wanted: dict[str, Any] = {"format": FORMAT, **json.loads(json.dumps(manifest))}  # as it will be read again
+        self._lock = FileLock(path / _LOCK)
         try:
-            return json.loads((self.path / MANIFEST).read_text())
-        except (OSError, ValueError):
-            raise ValueError(
-                f"{self.path} holds files that are no results of a benchmark; choose another folder"
-            ) from None
+            if path.exists() and not path.is_dir():
+                raise ValueError(f"{path} is a file; choose a folder for the results")
+            there = read_manifest(path) if path.exists() and _entries(path) else None
+            path.mkdir(parents=True, exist_ok=True)
+            self._lock.acquire(timeout=0)
+        except Timeout:
+            raise ValueError(f"{path}: another run is writing there; wait for it, or choose another folder") from None
+        except OSError as error:
+            raise ValueError(f"{path} cannot be written to: {error.strerror or error}") from None
+        try:
+            if there is not None and fresh:
+                self._remove_results()
+            elif there is not None:
+                wanted = self._joined(there, wanted)
+            self.manifest = wanted
+            text = json.dumps(wanted, indent=1)
+            write_atomically(path / MANIFEST, lambda draft: draft.write_text(text, encoding="utf-8"))
+            fixed = {part: value for part, value in wanted.items() if part not in MAY_GROW}
+            self._benchmark = digest(json.dumps(fixed, sort_keys=True), 8)
+            self._files = self._whole_files()
+        except BaseException as error:
+            self.close()
+            if isinstance(error, OSError):
+                raise ValueError(f"{path} cannot be written to: {error.strerror or error}") from None
+            raise
 
-    def _check_same(self, there: Mapping[str, Any], manifest: Mapping[str, Any]) -> None:
-        for part, wanted in manifest.items():
-            if part not in MAY_GROW and there.get(part) != wanted:
+    def close(self) -> None:
+        """Let other runs write to the folder."""
+        self._lock.release()
+
+    def _joined(self, there: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, Any]:
+        """The manifest with what this run adds to it."""
+        for part, value in wanted.items():
+            if part not in MAY_GROW and there.get(part) != value:
                 raise ValueError(
-                    f"{self.path} holds results with {part} = {there.get(part)!r}, not {wanted!r}; they are not mixed: "
+                    f"{self.path} holds results with {part} = {there.get(part)!r}, not {value!r}; they are not mixed: "
                     "choose another folder, or have them replaced (--fresh)"
                 )
+        for part in MAY_GROW:
+            changed = [
+                name
+                for name, entry in wanted[part].items()
+                if _identity(there[part].get(name, entry)) != _identity(entry)
+            ]
+            if changed:
+                self.notices.append(
+                    f"changed since the last run in {self.path}, of the {part}: {', '.join(changed)}; their episodes "
+                    "are run again, and the old ones left out of the table (their files stay)"
+                )
+        return {**wanted, **{part: {**there[part], **wanted[part]} for part in MAY_GROW}}
 
-    def has(self, name: str) -> bool:
-        """Whether a batch is there."""
-        return self._file(name).is_file()
+    def _remove_results(self) -> None:
+        """Remove what a benchmark wrote, and nothing else."""
+        for name in (MANIFEST, TABLE, REPORT):
+            (self.path / name).unlink(missing_ok=True)
+        for path in (self.path / BATCHES).glob("*.parquet"):
+            if _BATCH.fullmatch(path.name):
+                path.unlink()
 
-    def add(self, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Keep a batch's rows."""
-        write_atomically(self._file(name), pd.DataFrame(rows).to_parquet)
+    def _whole_files(self) -> dict[str, Path]:
+        """Files of this benchmark's batches by their keys; damaged ones are removed, foreign ones noted."""
+        files, foreign, damaged = {}, [], 0
+        for folder in (self.path, self.path / BATCHES):
+            for draft in folder.glob(f"{_DRAFT}*"):  # of a run that was killed
+                draft.unlink()
+        for path in sorted((self.path / BATCHES).glob("*")):
+            match = _BATCH.fullmatch(path.name)
+            if match is None or match[2] != self._benchmark:
+                foreign.append(path.name)
+            elif digest(path.read_bytes()) != match[5]:
+                path.unlink()
+                damaged += 1
+            else:
+                files[match[1]] = path
+        place = self.path / BATCHES
+        if foreign:
+            self.notices.append(f"left out, being no results of this benchmark: {', '.join(foreign)} in {place}")
+        if damaged:
+            self.notices.append(f"{damaged} damaged file(s) in {place}: their episodes are run again")
+        return files
+
+    def _key(self, driver: str, authority: str, batch: str) -> str:
+        whose = (
+            _digest_of(self.manifest[part], name) for part, name in zip(MAY_GROW, (driver, authority), strict=True)
+        )
+        return "-".join([self._benchmark, *whose, digest(batch)])
+
+    def has(self, driver: str, authority: str, batch: str) -> bool:
+        """Whether the rows of a batch are there.
+
+        Args:
+            driver, authority: their names.
+            batch: text that says what is in it.
+        """
+        return self._key(driver, authority, batch) in self._files
+
+    def add(self, driver: str, authority: str, batch: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Keep a batch's rows; arguments as those of :meth:`has`."""
+        content, key = pd.DataFrame(rows).to_parquet(), self._key(driver, authority, batch)
+        path = self.path / BATCHES / f"{key}-{digest(content)}.parquet"
+        write_atomically(path, lambda draft: draft.write_bytes(content))
+        self._files[key] = path
 
     def table(self) -> pd.DataFrame:
-        """All episodes so far, one row each, in the order of their names."""
-        parts = [pd.read_parquet(path) for path in sorted((self.path / "episodes").glob("*.parquet"))]
+        """All episodes so far of the drivers and authorities as they are now, in the order of their names."""
+        drivers, authorities = (
+            {_digest_of(self.manifest[part], name) for name in self.manifest[part]} for part in MAY_GROW
+        )
+        parts = []
+        for key, path in self._files.items():
+            _, driver, authority, _ = key.split("-")
+            if driver in drivers and authority in authorities:
+                parts.append(pd.read_parquet(path))
         return sorted_table(pd.concat(parts)) if parts else pd.DataFrame(columns=IDENTITY)
 
-    def _file(self, name: str) -> Path:
-        return self.path / "episodes" / f"{name}.parquet"
+
+def _identity(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """What makes an entry the one that it is: all but where it was found."""
+    return {name: value for name, value in entry.items() if name != "origin"}
+
+
+def _digest_of(entries: Mapping[str, Any], name: str) -> str:
+    return digest(json.dumps([name, _identity(entries[name])], sort_keys=True), 8)
+
+
+def _entries(path: Path) -> list[str]:
+    """What a folder holds, without what a run that did not get far leaves."""
+    return [entry.name for entry in path.iterdir() if entry.name != _LOCK and not entry.name.startswith(_DRAFT)]
+
+
+def read_manifest(path: Path) -> dict[str, Any]:
+    """What the results in a folder are of.
+
+    Raises:
+        ValueError: if it holds no results of a benchmark, or of a version with another layout.
+    """
+    try:
+        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        manifest = None
+    whole = isinstance(manifest, dict) and manifest.get("format") == FORMAT
+    if not whole or not all(isinstance(manifest.get(part), dict) for part in MAY_GROW):
+        raise ValueError(
+            f"{path} holds files that are no results of a benchmark of this version; choose another folder"
+        )
+    return manifest
 
 
 def sorted_table(table: pd.DataFrame) -> pd.DataFrame:

@@ -51,7 +51,9 @@ def _compile_beside(compile_kernel: Callable[[], None], driver: bool) -> None:
     code = f"import sys; sys.path[:] = {sys.path!r}; from {solvers.__package__} import solvers; {addresses}"
     silent: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     try:
-        other = subprocess.Popen([sys.executable, "-c", code], **silent)
+        # As multiprocessing does: with the flags that this Python was started with, such as -I.
+        flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
+        other = subprocess.Popen([sys.executable, *flags, "-c", code], **silent)
     except OSError:
         return
     try:

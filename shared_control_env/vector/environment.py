@@ -29,7 +29,7 @@ from shared_control_env.envs.cases import CASES, Case
 from shared_control_env.envs.episode import draw_episode, is_random
 from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.settings import OWN_TRAFFIC, Settings, plain
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, Clipping, space_of
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, Clipping, as_array, space_of
 from shared_control_env.vector import cold_start, kernel
 from shared_control_env.vector.records import (
     NOT_LOADED,
@@ -86,7 +86,8 @@ class SharedControlVectorEnv(VectorEnv):
         case: the scenario.
         num_envs: N.
         config: changes to the scenario's settings.
-        render_mode: ``rgb_array`` or ``human``; environment 0 is drawn, by the single environment's viewer.
+        render_mode: ``rgb_array`` for a picture of every environment, or ``human`` for a window with environment 0;
+            drawn by the single environment's viewer, one after the other.
         limiter: bind alpha_a with the fuzzy inference; else it is the action's slot ``authority``.
         driver: bind the driver's command with the paper's predictive driver, solved by an active-set method in
             the kernel; else it is the action's slot ``driver``.
@@ -134,9 +135,9 @@ class SharedControlVectorEnv(VectorEnv):
         self._limiter, self._driver = bool(limiter), bool(driver)
         self._case = case
         self._viewer_env: Any = None
-        default = configuration.merge(configuration.plain(Settings()), case.settings)
-        settings = configuration.check(configuration.change(default, config or {}))
-        _check_for_kernel(settings)
+        self._noted = np.zeros(self.num_envs, INFO)
+        self._drawn = {"rgb_array": self.num_envs, "human": 1}.get(render_mode or "", 0)
+        settings = settings_for_kernel(case, config or {})
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
         few = max(1, num_envs // FEWEST_PER_THREAD)
@@ -169,7 +170,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._started = False
         self._close_viewer()
         self.metadata["render_fps"] = settings.policy_frequency
-        self._path = np.zeros((settings.steps + 1, 2))
+        self._paths = np.zeros((self._drawn, settings.steps + 1, 2))
         self._random = any(template is not settings or is_random(template) for template in templates)
         self._episodes = [settings] * n
         sizes = sizes_for(templates)
@@ -358,7 +359,7 @@ class SharedControlVectorEnv(VectorEnv):
         return Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Draw environment 0; in ``rgb_array`` mode a tuple of its frame.
+        """Draw: every environment in ``rgb_array`` mode, as a tuple of frames; environment 0 in the window else.
 
         Raises:
             ValueError: before the first reset.
@@ -370,19 +371,23 @@ class SharedControlVectorEnv(VectorEnv):
         if self.render_mode is None:
             logger.warn("render() draws nothing without a render_mode; pass one to gym.make_vec, such as 'rgb_array'")
             return None
+        frames = [self._draw_picture(i) for i in range(self._drawn)]
+        return None if self.render_mode == "human" else tuple(frames)
+
+    def _draw_picture(self, i: int) -> Any:
+        """Draw environment i by a single environment that is put into its place."""
+        episode, batch = self._episodes[i], self._batch
         if self._viewer_env is None:
             make: Any = load_env_creator("shared_control_env.envs.shared_control:SharedControlEnv")
-            self._viewer_env = make(plain(self._episodes[0]), render_mode=self.render_mode)
-            self._shown = self._episodes[0]
-        if self._shown is not self._episodes[0]:
-            self._shown = self._episodes[0]
-            self._viewer_env.reset(options={"config": plain(self._shown)})
-        batch = self._batch
-        k = int(batch.scenes[0]["k"])
-        path = self._path[: k + 1]
-        self._viewer_env.show(batch.states[0], batch.traffic[0], batch.scenes[0], batch.signals[0], self._noted, path)
-        frame = self._viewer_env.render()
-        return None if frame is None else (frame,)
+            self._viewer_env, self._shown = make(plain(episode), render_mode=self.render_mode), episode
+        if self._shown is not episode:
+            self._viewer_env.reset(options={"config": plain(episode)})
+            self._shown = episode
+        path = self._paths[i, : int(batch.scenes[i]["k"]) + 1]
+        self._viewer_env.show(
+            batch.states[i], batch.traffic[i], batch.scenes[i], batch.signals[i], self._noted[i], path
+        )
+        return self._viewer_env.render()
 
     def _show(self) -> None:
         """Draw what people look at all the time."""
@@ -530,9 +535,10 @@ class SharedControlVectorEnv(VectorEnv):
             return self._advance(steps, active, anew, actions, out)
         finally:
             self._observations = out.observations.copy()
-            if self.render_mode is not None and active[0]:
-                self._noted = out.infos[0].copy()
-                self._path[self._batch.scenes[0]["k"]] = self._batch.states[0, :2]
+            if self._drawn:
+                self._noted = out.infos.copy() if active.all() else np.where(active, out.infos, self._noted)
+                seen = np.arange(self._drawn)
+                self._paths[seen, self._batch.scenes["k"][seen]] = self._batch.states[seen, :2]
 
     def _advance(self, steps: int, active: np.ndarray, anew: bool, actions: Actions, out: Outputs) -> Rollout:
         """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
@@ -633,6 +639,18 @@ class SharedControlVectorEnv(VectorEnv):
         return [None if number is None else seeding.np_random(number) for number in numbers]
 
 
+def settings_for_kernel(case: Case, config: Mapping[str, Any]) -> Settings:
+    """Settings of a scenario with changes, checked, those too that the kernel alone refuses.
+
+    Raises:
+        ValueError: for a wrong setting, or one that the single environment alone has.
+    """
+    default = configuration.merge(configuration.plain(Settings()), case.settings)
+    settings = configuration.check(configuration.change(default, config))
+    _check_for_kernel(settings)
+    return settings
+
+
 def _merged(settings: Settings, changes: Mapping[str, Any]) -> Settings:
     """Settings with some changes, checked."""
     return configuration.check(configuration.change(configuration.plain(settings), changes))
@@ -648,8 +666,8 @@ def _check_for_kernel(settings: Settings) -> None:
     for i, entry in enumerate(settings.randomise):
         if entry.setting in ONE_FOR_ALL:
             raise ValueError(
-                f"config['randomise'][{i}]['setting'] = {entry.setting!r} is shared by all environments of the kernel, so "
-                "that it cannot be drawn; use gym.make_vec(..., vectorization_mode='sync')"
+                f"config['randomise'][{i}]['setting'] = {entry.setting!r} is shared by all environments of the kernel, "
+                "so that it cannot be drawn; use gym.make_vec(..., vectorization_mode='sync')"
             )
     if len(settings.vehicles) > MAX_HOLES:
         raise ValueError(f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}")
@@ -674,7 +692,7 @@ def _is_integer(value: Any) -> bool:
 def _numbers(value: Any) -> np.ndarray | None:
     """A new array of real numbers, None where the value is something else."""
     try:
-        array = np.asarray(value)
+        array = np.asarray(as_array(value))
     except ValueError:  # rows of different lengths
         return None
     return array.astype(np.float64) if array.dtype.kind in "fiub" else None

@@ -88,14 +88,14 @@ class StableBaselinesVecEnv(VecEnv):
         self.env.close()
 
     def render(self, mode: str | None = None) -> np.ndarray | None:
-        """Show environment 0 in ``human`` mode; its picture in ``rgb_array`` mode."""
+        """Show environment 0 in ``human`` mode; the pictures of all, as tiles, in ``rgb_array`` mode."""
         if self.render_mode == "human":
             self.env.render()
             return None
         return super().render(mode)
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """The picture of environment 0 alone."""
+        """A picture of every environment."""
         return self.env.render() or ()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:

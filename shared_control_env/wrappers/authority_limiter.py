@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from shared_control_env.controllers.allocators import Allocator
+from shared_control_env.controllers.allocators import Allocator, checked_authority
 from shared_control_env.core import single
 from shared_control_env.envs.slots import AUTHORITY
 from shared_control_env.wrappers.slots import SlotWrapper
@@ -48,5 +48,5 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
     def decide(self) -> np.ndarray:
         """alpha_a of the planned step, shape (1,)."""
         if self.allocator is not None:
-            return np.array([self.allocator.allocate(self.shared.scene, self.shared.signals)])
+            return np.array([checked_authority(self.allocator.allocate(self.shared.scene, self.shared.signals))])
         return np.array([single.fuzzy_authority(self.shared.signals, self.shared.parameters)])

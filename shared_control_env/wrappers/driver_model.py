@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from shared_control_env.controllers.driver import Driver, PredictiveDriver
+from shared_control_env.controllers.driver import Driver, PredictiveDriver, checked_command
 from shared_control_env.envs.settings import parameters_of
 from shared_control_env.envs.slots import DRIVER
 from shared_control_env.wrappers.slots import SlotWrapper
@@ -54,9 +54,7 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
 
     def decide(self) -> np.ndarray:
         """The driver's command over its limits, shape (2,)."""
-        command = np.asarray(self.driver.act(self.shared.observation, self.shared.scene), dtype=float)
-        if command.shape != (2,) or not np.isfinite(command).all():
-            raise ValueError(f"driver.act() gave {command!r}; it must give finite [a, delta] [m/s^2, rad], shape (2,)")
+        command = checked_command(self.driver.act(self.shared.observation, self.shared.scene))
         return command / self.shared.command_limits
 
     def _report(self) -> dict[str, Any]:

@@ -75,7 +75,7 @@ def test_a_file_that_is_no_recording_is_refused(tmp_path):
 def test_models_of_stable_baselines_drive(tmp_path, algorithm):
     model = algorithm("MlpPolicy", gym.make(ID, config=CONFIG), device="cpu", seed=0)
     model.save(tmp_path / "model.zip")
-    entry = driver_entry(str(tmp_path / "model.zip"))
+    entry = driver_entry(str(tmp_path / "model.zip"), trusted=True)
     np.testing.assert_array_equal(drive(entry.make()), drive(ModelDriver(model)))
     assert isinstance(entry.make(), Driver)
     assert len(evaluate({"model": entry}, "proportional", Suite("s", ("two_lane",), (None,)))) == 1
@@ -84,17 +84,17 @@ def test_models_of_stable_baselines_drive(tmp_path, algorithm):
 def test_models_that_are_no_drivers_are_refused(tmp_path):
     A2C("MlpPolicy", gym.make("Pendulum-v1"), device="cpu").save(tmp_path / "a2c.zip")
     with pytest.raises(ValueError, match=r"shape \(3,\)"):
-        driver_entry(str(tmp_path / "a2c.zip")).make()
+        driver_entry(str(tmp_path / "a2c.zip"), trusted=True).make()
     with pytest.raises(ValueError, match="no such file"):
         driver_entry("missing.zip")
     with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
         archive.writestr("text", "text")
     with pytest.raises(ValueError, match=r"other\.zip.* is no model"):
-        driver_entry(str(tmp_path / "other.zip"))
+        driver_entry(str(tmp_path / "other.zip"), trusted=True)
     env = gym.make("CartPole-v1")
     DQN("MlpPolicy", env, buffer_size=10, device="cpu").save(tmp_path / "dqn.zip")
     with pytest.raises(ValueError, match="holds a DQNPolicy"):
-        driver_entry(str(tmp_path / "dqn.zip"))
+        driver_entry(str(tmp_path / "dqn.zip"), trusted=True)
 
 
 def test_names():

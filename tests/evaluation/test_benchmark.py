@@ -17,8 +17,9 @@ from shared_control_env.cli import summary
 from shared_control_env.controllers.scripted import ScriptedDriver
 from shared_control_env.evaluation import AUTHORITIES, DRIVERS, METRICS, SUITES, AuthorityEntry, Suite, evaluate
 from shared_control_env.evaluation import runner as runner_module
-from shared_control_env.evaluation.replay import replay_episode
+from shared_control_env.evaluation.episodes import Batch
 from shared_control_env.evaluation.storage import IDENTITY, ResultsFolder, write_atomically
+from tests.evaluation.single import drive_single
 
 SMALL = Suite("two scenarios and degradations", ("lane_change", "bend"), ("none", "bias_ramp", "white_noise"))
 TIMED = ["real_time_factor"]
@@ -55,7 +56,7 @@ def test_the_single_environment_gives_the_same_metrics(scenario, authority):
     suite = Suite("one", (scenario,), ("oscillation",))
     row = evaluate("distracted", authority, suite, seeds=[11]).iloc[0]
     entries = ("distracted", DRIVERS["distracted"]), (authority, AUTHORITIES[authority])
-    single = replay_episode(scenario, *entries, "oscillation", 11)
+    single = drive_single(Batch(scenario, *entries, (("oscillation", 11),), {}))
     for name in set(METRICS) - set(TIMED):
         assert single[name] == pytest.approx(row[name], abs=1e-9, nan_ok=True), name
 
@@ -116,7 +117,7 @@ def test_resumes_without_losing_or_doubling(tmp_path, monkeypatch):
         for batch, rows in real(batches, jobs, engine):
             if len(ran) == 2:
                 raise KeyboardInterrupt
-            ran.append(batch.name)
+            ran.append(batch.key)
             yield batch, rows
 
     monkeypatch.setattr(runner_module, "_run", stopping)
@@ -136,7 +137,7 @@ def test_drivers_can_be_added_later(tmp_path):
     evaluate("none", "fixed", SMALL, out=tmp_path)
     table = evaluate("scripted", "fixed", SMALL, out=tmp_path)
     assert set(table["driver"]) == {"none", "scripted"}
-    assert json.loads((tmp_path / "benchmark.json").read_text())["drivers"] == ["none", "scripted"]
+    assert json.loads((tmp_path / "benchmark.json").read_text())["drivers"].keys() == {"none", "scripted"}
 
 
 @pytest.mark.parametrize("changed", [{"seeds": [1]}, {"suite": "paper"}, {"config": {"duration": 5.0}}])
@@ -246,10 +247,10 @@ def test_a_full_disk_is_said_and_what_was_done_is_kept(tmp_path, monkeypatch):
 
     real = ResultsFolder.add
 
-    def add_until_full(folder, name, rows):
+    def add_until_full(folder, *arguments):
         if len(list(tmp_path.rglob("*.parquet"))) == 1:
             raise OSError(28, "No space left on device")
-        real(folder, name, rows)
+        real(folder, *arguments)
 
     arguments = [
         "benchmark",

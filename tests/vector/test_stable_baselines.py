@@ -110,7 +110,8 @@ def test_videos_are_recorded(tmp_path):
 def test_images_and_attributes():
     env = make(3, render_mode="rgb_array")
     env.reset()
-    assert env.get_images()[0].ndim == 3
-    assert env.render().shape == env.get_images()[0].shape
+    images = env.get_images()
+    assert [image.shape for image in images] == [images[0].shape] * 3
+    assert env.render().ndim == 3
     assert env.get_attr("threads") == [env.env.threads] * 3
     assert env.env_is_wrapped(gym.Wrapper) == [False] * 3

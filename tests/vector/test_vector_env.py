@@ -134,7 +134,7 @@ def test_a_drawn_episode_is_shown_as_it_is():
     for _ in range(6):
         env.step(np.zeros((2, 2)))
     assert env.render()[0].shape == first.shape
-    assert env.unwrapped._viewer_env.settings.road == env.unwrapped.episodes[0].road
+    assert env.unwrapped._viewer_env.settings.road == env.unwrapped.episodes[-1].road
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -307,7 +307,7 @@ def test_spec_round_trips():
     assert again.unwrapped.config == env.unwrapped.config
 
 
-def test_renders_environment_0_as_the_single_one():
+def test_renders_every_environment_as_the_single_one():
     config = {"faults": FAULTS["steering"]}
     single = gym.make(TWO_LANE, config=config, render_mode="rgb_array")
     many = gym.make_vec(TWO_LANE, num_envs=3, config=config, render_mode="rgb_array")
@@ -316,8 +316,10 @@ def test_renders_environment_0_as_the_single_one():
     for _ in range(30):
         single.step(np.zeros(2, dtype=np.float32))
         many.step(np.zeros((3, 2), dtype=np.float32))
-    (frame,) = many.render()
-    np.testing.assert_array_equal(frame, single.render())
+    frames = many.render()
+    assert len(frames) == 3
+    for frame in frames:
+        np.testing.assert_array_equal(frame, single.render())
     many.close()
 
 

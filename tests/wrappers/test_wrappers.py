@@ -109,6 +109,6 @@ def test_a_drivers_malformed_command_moves_nothing(command):
     env = DriverModel(gym.make("SharedControl/TwoLane-v0"), Steady(command))
     env.reset(seed=0)
     state = env.unwrapped.vehicle.array.copy()
-    with pytest.raises(ValueError, match=r"driver\.act\(\) gave"):
+    with pytest.raises(ValueError, match=r"driver: act\(\) gave"):
         env.step(0)
     np.testing.assert_array_equal(env.unwrapped.vehicle.array, state)

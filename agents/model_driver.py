@@ -49,8 +49,8 @@ class ModelDriver:
         last = data.get("_last_obs")
         if last is not None and np.abs(np.asarray(last, dtype=float)).max() > 1.0:
             raise ValueError(
-                f"{path} was trained on observations beyond the environment's bounds, so behind VecNormalize or the like, "
-                "whose statistics it does not hold; train without, or with agents.train, which has its own"
+                f"{path} was trained on observations beyond the environment's bounds, so behind VecNormalize or the "
+                "like, whose statistics it does not hold; train without, or with agents.train, which has its own"
             )
         made_by = data["policy_class"]
         for algorithm in ALGORITHMS.values():

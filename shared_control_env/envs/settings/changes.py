@@ -108,9 +108,10 @@ def change(config: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
     if "randomise" not in changes:
         merged["randomise"] = [entry for entry in config["randomise"] if not _concerns(entry["setting"], paths)]
         return merged
-    for i, entry in enumerate(merged["randomise"]):
+    entries = merged["randomise"] if isinstance(merged["randomise"], list) else []
+    for i, entry in enumerate(entries):
         setting = entry.get("setting") if isinstance(entry, Mapping) else None
-        if setting in paths and at(merged, paths[setting]) != at(config, paths[setting]):
+        if isinstance(setting, str) and setting in paths and at(merged, paths[setting]) != at(config, paths[setting]):
             raise ValueError(
                 f"config['randomise'][{i}] draws {setting!r}, which is set to {at(merged, paths[setting])!r} too; "
                 "leave one of the two out"

@@ -78,7 +78,7 @@ def _explain(error: ValidationError) -> str:
         names = [name for name in first["ctx"]["expected"].split("'") if name.strip(" ,or")]
         near = nearest(first["input"], names)
         return text + (f"; did you mean {near!r}?" if near else "")
-    bounds = {name: value for each in _field(first["loc"])[1] for name, value in _bounds(each)}
+    bounds = {name: value for each in _field(first["loc"])[1] for name, value in bounds_of(each)}
     ends = []
     for word, name, open_name in (("smallest", "ge", "gt"), ("largest", "le", "lt")):
         if name in bounds:
@@ -88,7 +88,8 @@ def _explain(error: ValidationError) -> str:
     return text + (f" (allowed: {', '.join(ends)})" if ends else "")
 
 
-def _bounds(metadata: Any) -> list[tuple[str, Any]]:
+def bounds_of(metadata: Any) -> list[tuple[str, Any]]:
+    """Ends of a range, as pairs of ``gt``, ``ge``, ``lt`` or ``le`` and the number, that a field's metadata sets."""
     found = ((name, getattr(metadata, name, None)) for name in ("gt", "ge", "lt", "le"))
     return [(name, value) for name, value in found if value is not None]
 

@@ -159,7 +159,10 @@ _TASK_FROM_ROAD = (
     *("change_onset", "change_duration"),
 )
 _Longitudinal = _section(
-    "_Longitudinal", core.LongitudinalRiskParameters, "graded", preset=(Literal["paper", "graded"], "graded")
+    "_Longitudinal",
+    core.LongitudinalRiskParameters,
+    *("graded", "alpha", "A_f"),  # the heights cancel in the ratio of Eq. 7
+    preset=(Literal["paper", "graded"], "graded"),
 )
 _Task = _section("_Task", core.TaskParameters, *_TASK_FROM_ROAD)
 _Vehicle = _section("_Vehicle", core.VehicleParameters)

@@ -1,0 +1,178 @@
+"""Random and hostile input: ``python -m benchmarks.fuzz`` tries it on the environments and says what was wrong.
+
+A configuration is either refused by a ValueError or drives: the observation stays in its space, all signals are
+finite, an episode that is lost ends, and nothing takes long. Stopped, the command goes on where it was; a fault is
+shown with the command that tries it again by itself.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any
+
+import gymnasium as gym
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+import shared_control_env  # noqa: F401
+from benchmarks.random_settings import random_config
+from shared_control_env.evaluation.episodes import source_digest
+from shared_control_env.evaluation.interrupt import resumable
+from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.registration import ENVIRONMENTS
+from shared_control_env.wrappers import DriverModel
+
+PATIENCE = 5.0
+"""Longest time that one configuration may take [s]."""
+
+STEPS = 8
+"""Steps that a configuration is driven in the single environment."""
+
+BATCH, LENGTH = 64, 50
+"""Environments, and steps of each, that a configuration is driven in the kernel."""
+
+SAVED_EVERY = 50
+"""Configurations between two notes of what is done."""
+
+IDS = list(ENVIRONMENTS)
+
+
+def try_single(rng: np.random.Generator) -> int:
+    """One configuration in the single environment, with the predictive driver half of the time.
+
+    Returns:
+        Steps that it drove, 0 where it was refused.
+
+    Raises:
+        AssertionError: for what must not be.
+    """
+    name, config = IDS[int(rng.integers(len(IDS)))], random_config(rng)
+    begin = perf_counter()
+    try:
+        env = gym.make(name, config=config, disable_env_checker=True)
+        env = DriverModel(env) if rng.random() < 0.5 else env
+        env.reset(seed=int(rng.integers(2**31)))
+    except ValueError:
+        assert perf_counter() - begin < PATIENCE, f"{name}, {config!r}: refusing took {perf_counter() - begin:.1f} s"
+        return 0
+    for steps in range(1, STEPS + 1):
+        observation, reward, terminated, truncated, info = env.step(_action(env.action_space, rng))
+        _check(observation, np.array(reward), info, np.array(terminated), f"{name}, {config!r}")
+        if terminated or truncated:
+            break
+    assert perf_counter() - begin < PATIENCE, f"{name}, {config!r}: took {perf_counter() - begin:.1f} s"
+    return steps
+
+
+def try_kernel(rng: np.random.Generator) -> int:
+    """One configuration in the kernel, for many steps; arguments and result as those of :func:`try_single`."""
+    name, config = IDS[int(rng.integers(len(IDS)))], random_config(rng, wrong=0.0)
+    try:
+        env: Any = gym.make_vec(name, num_envs=BATCH, config=config, threads=1, driver=bool(rng.integers(2)))
+        env.reset(seed=int(rng.integers(2**31)))
+    except ValueError:
+        return 0
+    begin = perf_counter()
+    for steps in range(1, LENGTH + 1):
+        actions = env.action_space.sample() if env.unwrapped._driver else rng.uniform(-1.5, 1.5, (BATCH, 2))
+        try:
+            observation, reward, terminated, _, info = env.step(actions)
+        except ValueError as error:
+            if "config" not in str(error):  # else an episode that cannot be drawn
+                raise
+            break
+        _check(observation, reward, info, terminated, f"{name}, {config!r}")
+    assert perf_counter() - begin < BATCH * PATIENCE, f"{name}, {config!r}: took {perf_counter() - begin:.1f} s"
+    env.close()
+    return steps * BATCH
+
+
+def _action(space: gym.Space, rng: np.random.Generator) -> Any:
+    return 0 if isinstance(space, gym.spaces.Discrete) else rng.uniform(-1.5, 1.5, space.shape)
+
+
+def _check(
+    observation: np.ndarray, reward: np.ndarray, info: dict[str, Any], terminated: np.ndarray, what: str
+) -> None:
+    """What holds of every step: bounded observations, finite signals, and an end where the state is lost."""
+    running = ~terminated
+    assert (np.abs(observation[running] if observation.ndim > 1 else observation) <= 1.0).all() or not running.any(), (
+        what
+    )
+    for key in ("u_a_des", "u_a_f", "u_a_act", "u_h_des", "u_h_act", "u", "alpha_a", "r_x", "r_y", "state"):
+        assert np.isfinite(info[key]).all(), f"{what}: {key} = {info[key]!r}"
+    assert np.isfinite(reward[running]).all(), what
+    assert (np.asarray(info["alpha_a"]) >= 0.0).all(), what
+    assert (np.asarray(info["alpha_a"]) <= 1.0).all(), what
+
+
+def attempt(what: str, seed: int, index: int) -> tuple[int, str]:
+    """One trial by its number: the steps that it drove, and what the fault is, if there is one."""
+    tries: dict[str, Callable[[np.random.Generator], int]] = {"single": try_single, "kernel": try_kernel}
+    rng = np.random.default_rng([seed, index, list(tries).index(what)])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of cars that would be unstable on a motorway, and of actions out of bounds
+        try:
+            return tries[what](rng), ""
+        except Exception as error:
+            return 0, f"{type(error).__name__}: {error}"
+
+
+def main(
+    steps: Annotated[float, typer.Option(help="Steps in the kernel.")] = 1e6,
+    configs: Annotated[float, typer.Option(help="Configurations in the single environment.")] = 1e4,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything.")] = 0,
+    out: Annotated[Path, typer.Option(help="Folder of what is done.")] = Path("results/fuzz"),
+    only: Annotated[str, typer.Option(help="One trial again, such as single:17.")] = "",
+) -> None:
+    """Try random and hostile configurations and actions; stopped, it goes on where it was."""
+    console = Console()
+    if only:
+        what, _, number = only.partition(":")
+        console.print(*attempt(what, seed, int(number)), markup=False)
+        return
+    path = out / f"{source_digest()}-{seed}.json"
+    done = json.loads(path.read_text()) if path.exists() else {}
+    wanted = {"single": ("tried", int(configs)), "kernel": ("steps", int(steps))}
+    for what in wanted:  # what is compiled now takes no configuration's time
+        attempt(what, seed, 0)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with resumable(path), Progress(*columns, console=console) as bar:
+        for what, (counted, goal) in wanted.items():
+            state = done.setdefault(what, {"tried": 0, "drove": 0, "steps": 0, "faults": []})
+            task = bar.add_task(f"{what}: {counted}", total=goal)
+            while state[counted] < goal:
+                driven, fault = attempt(what, seed, state["tried"])
+                if fault:
+                    again = f"python -m benchmarks.fuzz --seed {seed} --only {what}:{state['tried']}"
+                    state["faults"].append([again, fault])
+                    console.print(f"{again}: {fault}", markup=False)
+                state["tried"] += 1
+                state["steps"] += driven
+                state["drove"] += driven > 0
+                bar.update(task, completed=min(state[counted], goal))
+                if state["tried"] % SAVED_EVERY == 0 or state[counted] >= goal:
+                    write_atomically(path, lambda draft: draft.write_text(json.dumps(done)))
+    for what, state in done.items():
+        console.print(
+            f"{what}: {state['tried']} configurations of {len(IDS)} environments; {state['drove']} drove "
+            f"{state['steps']} steps, the others were refused; {len(state['faults'])} fault(s)"
+        )
+    console.print(f"Kept in {path}.")
+    raise typer.Exit(any(state["faults"] for state in done.values()))
+
+
+if __name__ == "__main__":
+    typer.run(main)

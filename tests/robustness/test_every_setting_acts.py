@@ -1,0 +1,322 @@
+"""Every setting of the schema, changed by itself, changes something that can be observed, or is refused by name."""
+
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from shared_control_env.envs import settings as configuration
+from shared_control_env.envs.settings import Settings
+from shared_control_env.envs.settings.checks import NOT_DRAWN
+from shared_control_env.wrappers import DriverModel
+
+# A scenario in which every section has something to do: a lane change in traffic that changes lanes and brakes, under
+# two faults, with the predictive driver at the wheel and the law that needs alpha_a.
+BUSY = {
+    "duration": 1.5,
+    "ego": {"lateral_offset": 0.5},
+    "lane_change": {"onset": 0.2, "duration": 3.0, "lane": 1},
+    "vehicles": [
+        {"lane": 0, "position": 14.0, "speed": 9.0, "brake": {"onset": 0.3, "deceleration": 2.0}},
+        {"lane": 1, "position": 14.0, "speed": 11.0, "behaviour": "idm", "desired_speed": 13.0},
+        {"lane": 1, "position": -9.0, "speed": 16.0, "lane_change": {"onset": 0.3, "duration": 2.0, "lane": 0}},
+    ],
+    "faults": [
+        {"kind": "bias", "channel": "steering", "onset": 0.2, "ramp": 0.5, "duration": 3.0, "size": 0.1, "period": 0.4},
+        {"kind": "coloured_noise", "channel": "acceleration", "onset": 0.1, "size": 1.0, "seed": 3},
+        {"kind": "oscillation", "channel": "acceleration", "onset": 0.1, "size": 1.0},
+    ],
+    "degradations": [],
+    "randomise": [{"setting": "task.target_speed", "low": 12.0, "high": 14.0}],
+    "authority": {"law": "proportional"},
+    "driver_lag": {"T_h": 0.1},
+}
+
+# What each setting needs beside it to act, and the value to try where the rule below finds none.
+BESIDE = {
+    "longitudinal_risk.sigma_x": {"longitudinal_risk": {"preset": "paper"}},
+    "longitudinal_risk.preset": {},
+    "law_tolerances.tolerance_a": {"authority": {"law": "paper"}},
+    "law_tolerances.tolerance_delta": {"authority": {"law": "paper"}},
+    "safe_area.look_ahead": {"vehicles": [], "randomise": []},
+    "authority.operators": {},
+    "degradations": {"duration": 4.0, "vehicles": [], "faults": [], "randomise": []},
+    "task.target_speed": {"randomise": []},
+    "reward.conflict": {"authority": {"law": "none"}},
+}
+VALUES = {
+    "road.segments": [{"length": 30.0, "curvature": 0.0}, {"length": 100.0, "curvature": 0.01}],
+    "other_vehicles_type": "highway_env.vehicle.kinematics.Vehicle",
+    "centering_position": [0.5, 0.5],
+    "vehicles": [],
+    "faults": [],
+    "degradations": ["step_bias"],
+    "randomise": [],
+    "lane_change": None,
+    "policy_frequency": 10,
+    "simulation_frequency": 40,
+    "offscreen_rendering": False,
+    "road.lanes": 3,
+    "ego.lane": 1,
+    "duration": 1.0,
+    "law_tolerances.tolerance_a": 3.0,
+    "law_tolerances.tolerance_delta": 0.3,
+    "longitudinal_risk.b": 1.0,
+    "task.target_speed": 5.0,
+    "vehicle.l_r": 1.1,
+    "vehicle.C_r": 70_000.0,
+}
+# Refused beside these settings, by name; what is told is checked too.
+REFUSED = {"other_vehicles_type": "knows no plans", "neighbour_vehicles_connected_lanes": "would not act"}
+# Acts on the clock or on a window alone.
+NOT_SEEN = {"real_time_rendering", "offscreen_rendering"}
+
+
+def leaves(section, path=""):
+    for name, field in section.model_fields.items():
+        kind = field.annotation
+        if hasattr(kind, "model_fields"):
+            yield from leaves(kind, f"{path}{name}.")
+        else:
+            yield f"{path}{name}"
+
+
+LEAVES = list(leaves(Settings))
+
+
+def nested(path, value):
+    first, _, rest = path.partition(".")
+    return {first: nested(rest, value) if rest else value}
+
+
+def tried(call):
+    """What a call gives, and the ValueError that it raises instead."""
+    try:
+        return call(), None
+    except ValueError as error:
+        return None, error
+
+
+def other(value):
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return value + 1
+    if isinstance(value, float):
+        return 0.7 * value if value else 0.5
+    raise AssertionError(value)
+
+
+def observed(config):
+    """All that a seeded episode shows: length, observations, rewards, infos, two pictures."""
+    env = DriverModel(gym.make("SharedControl/TwoLane-v0", render_mode="rgb_array", config=config))
+    trace = [env.reset(seed=1), env.render()]
+    done = False
+    while not done:
+        trace.append(env.step(0))
+        done = trace[-1][2] or trace[-1][3]
+    trace.append(env.render())
+    env.close()
+    return flat(trace)
+
+
+def flat(value):
+    if isinstance(value, dict):
+        return b"".join(flat(value[key]) for key in sorted(value))
+    if isinstance(value, list | tuple):
+        return b"".join(flat(item) for item in value)
+    return np.asarray(value).tobytes()
+
+
+@pytest.fixture(scope="module")
+def plainly():
+    return {}
+
+
+@pytest.mark.parametrize("path", LEAVES)
+def test_it_acts_or_is_refused(path, plainly):
+    beside = {**BUSY, **BESIDE.get(path, {})}
+    before = configuration.merge(configuration.plain(Settings()), beside)
+    value = VALUES[path] if path in VALUES else other_value(path, before)
+    changes = configuration.merge(before, nested(path, value))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of cars that would be unstable at 40 m/s
+        if path in REFUSED:
+            with pytest.raises(ValueError, match=REFUSED[path]):
+                observed(changes)
+            return
+        key = str(BESIDE.get(path))
+        if key not in plainly:
+            plainly[key] = observed(before)
+        if path in NOT_SEEN:
+            return
+        assert observed(changes) != plainly[key], f"{path} = {value!r} changes nothing"
+
+
+def other_value(path, config):
+    value = configuration.changes.at(config, tuple(path.split(".")))
+    if isinstance(value, str):
+        choices = {"authority.law": "none", "authority.operators": "min-max", "longitudinal_risk.preset": "paper"}
+        return choices[path]
+    return other(value)
+
+
+@pytest.mark.parametrize("path", [path for path in LEAVES if path.split(".")[0] not in NOT_DRAWN])
+def test_it_can_be_drawn_or_is_refused(path):
+    config = configuration.merge(configuration.plain(Settings()), {**BUSY, "randomise": []})
+    present = configuration.changes.at(config, tuple(path.split(".")))
+    if not is_number(present):
+        with pytest.raises(ValueError, match=r"no number|must have"):
+            configuration.check({**config, "randomise": [{"setting": path, "low": 0.0, "high": 1.0}]})
+        return
+    value = VALUES.get(path, other(present))
+    config["randomise"] = [{"setting": path, "choices": [value]}]
+    env, error = tried(lambda: gym.make("SharedControl/TwoLane-v0", config=config))
+    if error is None:
+        _, error = tried(lambda: env.reset(seed=0))
+    if error is not None:
+        assert path.split(".")[-1] in str(error) or "Hz" in str(error)
+        return
+    found = configuration.changes.at(configuration.plain(env.unwrapped.episode), tuple(path.split(".")))
+    assert found == value
+
+
+def is_number(value):
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+@pytest.mark.parametrize("path", LEAVES)
+def test_assigned_to_the_config_it_counts_from_the_next_reset_on(path):
+    env = gym.make("SharedControl/TwoLane-v0", config=BUSY).unwrapped
+    config = configuration.merge(configuration.plain(Settings()), BUSY)
+    value = VALUES[path] if path in VALUES else other_value(path, config)
+    *sections, last = path.split(".")
+    place = env.config
+    for name in sections:
+        place = place[name]
+    place[last] = value
+    _, error = tried(lambda: env.reset(seed=0))
+    if error is not None:
+        assert last in str(error) or path in REFUSED
+        return
+    assert configuration.changes.at(env.config, tuple(path.split("."))) == value
+    assert configuration.changes.at(configuration.plain(env.settings), tuple(path.split("."))) == value
+
+
+def test_configure_in_the_middle_of_an_episode_waits_for_the_next():
+    steady, changed = (gym.make("SharedControl/TwoLane-v0") for _ in range(2))
+    for env in (steady, changed):
+        env.reset(seed=0)
+    changed.unwrapped.configure({"simulation_frequency": 100, "duration": 1.0, "authority": {"law": "none"}})
+    for _ in range(40):
+        a, b = steady.step(np.zeros(2)), changed.step(np.zeros(2))
+        assert flat(a) == flat(b)
+    changed.reset(seed=0)
+    assert changed.unwrapped.episode.duration == 1.0
+
+
+EVERY = [
+    "SharedControl/LaneKeeping-v0",
+    "SharedControl/LaneChange-v0",
+    "SharedControl/Bend-v0",
+    "SharedControl/CutIn-v0",
+]
+
+
+@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("make", [gym.make, lambda name, config: gym.make_vec(name, num_envs=2, config=config)])
+def test_what_is_set_by_name_is_not_drawn(name, make):
+    env = make(name, config={"ego": {"speed": 11.5}})
+    for seed in range(3):
+        speed = env.reset(seed=seed)[1]["speed"]
+        assert np.all(np.asarray(speed) == 11.5)
+    drawn = {entry["setting"] for entry in env.unwrapped.config["randomise"]}
+    assert "ego.speed" not in drawn
+    assert drawn  # the rest still is
+
+
+def test_a_setting_both_set_and_drawn_is_refused_by_name():
+    draws = [{"setting": "ego.speed", "low": 10.0, "high": 12.0}]
+    with pytest.raises(ValueError, match=r"'randomise'\]\[0\] draws 'ego.speed', which is set to 20.0 too"):
+        gym.make("SharedControl/TwoLane-v0", config={"ego": {"speed": 20.0}, "randomise": draws})
+
+
+def test_a_whole_section_set_by_name_is_not_drawn():
+    env = gym.make("SharedControl/LaneKeeping-v0", config={"vehicles": []})
+    env.reset(seed=0)
+    assert not any(entry["setting"].startswith("vehicles") for entry in env.unwrapped.config["randomise"])
+    env = gym.make("SharedControl/LaneChange-v0", config={"lane_change": None})
+    env.reset(seed=0)
+    assert env.unwrapped.episode.lane_change is None
+
+
+def test_another_environments_config_is_taken_as_it_is():
+    bend = gym.make("SharedControl/Bend-v0")
+    copy = gym.make("SharedControl/TwoLane-v0", config=bend.unwrapped.config)
+    assert copy.unwrapped.config == bend.unwrapped.config
+    np.testing.assert_array_equal(copy.reset(seed=4)[0], bend.reset(seed=4)[0])
+
+
+@pytest.mark.parametrize("key", ["duration", "randomise"])
+def test_the_kernels_config_says_that_it_is_read_only(key):
+    env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=1)
+    with pytest.raises(TypeError, match="read only"):
+        env.unwrapped.config[key] = 1.0
+    with pytest.raises(TypeError, match="read only"):
+        env.unwrapped.config["ego"]["speed"] = 1.0
+
+
+def test_the_kernel_refuses_to_draw_what_all_share():
+    draws = [{"setting": "duration", "low": 1.0, "high": 2.0}]
+    with pytest.raises(ValueError, match=r"'duration' is shared by all"):
+        gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, config={"randomise": draws})
+    env = gym.make("SharedControl/TwoLane-v0", config={"randomise": draws, "faults": []})
+    env.reset(seed=0)
+    steps = 0
+    truncated = False
+    while not truncated:
+        truncated = env.step(np.zeros(2))[3]
+        steps += 1
+    assert steps == env.unwrapped.episode.steps
+    assert 20 <= steps <= 40
+
+
+def test_whole_numbers_are_drawn_with_both_ends():
+    draws = [{"setting": "automation.H_p", "low": 5, "high": 7}]
+    env = gym.make("SharedControl/TwoLane-v0", config={"randomise": draws})
+    seen = set()
+    for seed in range(40):
+        env.reset(seed=seed)
+        seen.add(env.unwrapped.episode.automation.H_p)
+    assert seen == {5, 6, 7}
+
+
+SHARED = {
+    "fault sizes": ({"faults": [{"kind": "stuck", "onset": 1.0, "size": 0.5}]}, "size'\\] = 0.5 would not act"),
+    "duty": ({"faults": [{"onset": 1.0, "size": 0.1, "duty": 0.2}]}, "needs a 'period'"),
+    "frequency": ({"faults": [{"onset": 1.0, "size": 0.1, "frequency": 2.0}]}, "bias has none"),
+    "noise seed": ({"faults": [{"onset": 1.0, "size": 0.1, "seed": 2}]}, "draws nothing"),
+    "perceptual channel": (
+        {"faults": [{"kind": "lane_offset", "channel": "both", "onset": 1.0, "size": 0.1}]},
+        "acts on no channel",
+    ),
+    "desired speed": ({"vehicles": [{"lane": 0, "position": 20.0, "speed": 9.0, "desired_speed": 3.0}]}, "'idm'"),
+    "change to the own lane": (
+        {"vehicles": [{"lane": 0, "position": 20.0, "speed": 9.0, "lane_change": {"onset": 1.0, "lane": 0}}]},
+        "in that lane",
+    ),
+    "width of the other field": ({"longitudinal_risk": {"sigma_x": 3.0}}, "preset 'paper'"),
+    "weights of a change": ({"longitudinal_risk": {"w_f_change": 0.3}}, "no config\\['lane_change'\\]"),
+    "tolerance of another law": (
+        {"authority": {"law": "none"}, "law_tolerances": {"tolerance_a": 1.0}},
+        "the law is 'none'",
+    ),
+    "field of the driver": ({"driver": {"R": 1.0}}, "'R'\\] is not a setting"),
+}
+
+
+@pytest.mark.parametrize(("config", "message"), SHARED.values(), ids=list(SHARED))
+def test_what_would_not_act_is_refused(config, message):
+    with pytest.raises(ValueError, match=message):
+        gym.make("SharedControl/TwoLane-v0", config=config)

@@ -99,7 +99,7 @@ class Policy:
 
     def _check(self, path: Path) -> None:
         """Raise ValueError unless the layers make an action of the task of what it sees, in finite numbers."""
-        if self.hidden not in ACTIVATIONS or not isinstance(self.squashed, bool):
+        if not isinstance(self.hidden, str) or self.hidden not in ACTIVATIONS or not isinstance(self.squashed, bool):
             raise ValueError(
                 f"{path} has the shape hidden = {self.hidden!r}, squashed = {self.squashed!r}; known are "
                 f"{', '.join(ACTIVATIONS)}, and true or false"

@@ -136,16 +136,14 @@ def benchmark(
     console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.")
 
 
-def summary(table: Any, width: int = 80) -> Table:
-    """Means of the main metrics by authority and driver: side by side, or one below the other in a narrow terminal."""
+def summary(table: Any, width: int = 80) -> Table | str:
+    """Means of the main metrics by authority and driver: a table, or lines where the terminal is too narrow for it."""
     means = table.groupby(["authority", "driver"])[list(COLUMNS)].mean()
-    names = max(sum(map(len, pair)) for pair in means.index)
-    if names + 50 > width:
-        narrow = Table("pair", "mean", "", title="Means over all episodes", pad_edge=False)
-        for (authority, driver), row in means.iterrows():
-            for title, value in zip(COLUMNS.values(), row, strict=True):
-                narrow.add_row(f"{authority}, {driver}", title, f"{value:.2g}")
-        return narrow
+    if max(sum(map(len, pair)) for pair in means.index) + 55 > width:
+        return "\n".join(
+            f"{authority}, {driver}: " + ", ".join(f"{t} {v:.2g}" for t, v in zip(COLUMNS.values(), row, strict=True))
+            for (authority, driver), row in means.iterrows()
+        )
     printed = Table(title="Means over all episodes", pad_edge=False)
     for name in ("authority", "driver"):
         printed.add_column(name, no_wrap=True)

@@ -95,7 +95,7 @@ class _CheckedFile(IndexDataCacheFile):
     def _load_data(self, name: str) -> Any:
         digest, content = super()._load_data(name)
         if sha256(content).digest() != digest:
-            raise OSError(f"{name} is damaged")
+            raise ValueError(f"{name} is damaged")
         return pickle.loads(content)
 
 

@@ -227,8 +227,8 @@ def conclude(
     Returns:
         Reward, and whether the episode terminates: by a collision or off the road.
     """
-    z = scene.z
-    on_road = is_on_road(scene, p) and np.isfinite(z[0] + z[2] + z[3] + z[4] + z[5])
+    x = scene.state
+    on_road = is_on_road(scene, p) and np.isfinite(x[0] + x[1] + x[2] + x[3] + x[4] + x[5])
     terminated = crashed or not on_road
     reward_terms(previous_s, scene, signals, last_a, terminated, p, terms)
     count_departures(scene, p, memory)

@@ -42,6 +42,10 @@ def _parts(value: Any, module: str, seen: set[int]) -> Iterator[str]:
         yield value.__name__
     elif isinstance(value, partial):
         yield from _parts((value.func, value.args, value.keywords), module, seen)
+    elif isinstance(value, CodeType):
+        yield from _of_code(value)
+    elif hasattr(value, "py_func"):  # compiled by numba
+        yield from _parts(value.py_func, module, seen)
     elif isinstance(value, MethodType):
         yield from _parts((value.__func__, value.__self__), module, seen)
     elif isinstance(value, type):

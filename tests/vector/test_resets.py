@@ -244,3 +244,35 @@ def test_the_infos_mask_is_not_the_callers():
     infos = env.reset(options={"reset_mask": mask})[1]
     mask[:] = True
     np.testing.assert_array_equal(infos["_t"], [True, False])
+
+
+@pytest.mark.parametrize("mode", ["next_step", "same_step"])
+def test_changed_settings_act_on_the_episodes_that_begin_then(mode):
+    """More faults and a longer road than there was room for; the episodes under way go on as without the change."""
+    config = {"duration": 0.5, "faults": []}
+    many = {
+        "faults": [{"channel": "acceleration", "onset": 0.0, "size": 0.5}, {"onset": 0.0, "size": 0.01}],
+        "road": {"segments": [{"length": 40.0}, {"length": 90.0, "curvature": 1 / 60}]},
+    }
+    changed, plain, after = (
+        gym.make_vec(TWO_LANE, num_envs=2, config=c, autoreset_mode=mode) for c in (config, config, {**config, **many})
+    )
+    for env in (changed, plain, after):
+        env.reset(seed=0)
+    action = np.full((2, 2), 0.1)
+    for _ in range(4):
+        changed.step(action)
+        plain.step(action)
+    changed.unwrapped.set_config(many)
+    for _ in range(6):
+        a, b = changed.step(action), plain.step(action)
+    if mode == "same_step":
+        np.testing.assert_array_equal(a[4]["final_obs"], b[4]["final_obs"])
+    else:
+        np.testing.assert_array_equal(a[0], b[0])
+        changed.step(action)
+    for _ in range(9):
+        a, b = changed.step(action), after.step(action)
+        np.testing.assert_array_equal(a[0], b[0])
+        np.testing.assert_array_equal(a[4]["u_a_f"], b[4]["u_a_f"])
+    assert a[4]["fault_active"].all()

@@ -5,6 +5,7 @@ import pytest
 pytest.importorskip("stable_baselines3", reason="needs the extra 'train'")
 
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize, VecVideoRecorder
 
 import shared_control_env  # noqa: F401
@@ -115,3 +116,33 @@ def test_images_and_attributes():
     assert env.render().ndim == 3
     assert env.get_attr("threads") == [env.env.threads] * 3
     assert env.env_is_wrapped(gym.Wrapper) == [False] * 3
+
+
+def test_options_act_while_learning():
+    class Curriculum(BaseCallback):
+        speeds = ()
+
+        def _on_step(self):
+            if self.n_calls == 15:
+                self.training_env.set_options({"config": {"ego": {"speed": 9.0}, "faults": []}})
+            self.speeds = [episode.ego.speed for episode in self.training_env.env.episodes]
+            return True
+
+    env = make(3)
+    callback = Curriculum()
+    PPO("MlpPolicy", env, n_steps=16, batch_size=48, device="cpu").learn(3 * 48, callback=callback)
+    assert callback.speeds == [9.0] * 3
+    assert env.env.scenes["z"][:, 3].max() < 12.0
+
+
+def test_options_that_need_a_reset_are_refused_while_stepping():
+    env = make(2)
+    env.reset()
+    for options, words in (({"duration": 0.5}, "duration"), ({"vehicles": []}, "vehicles")):
+        env.set_options({"config": options})
+        with pytest.raises(ValueError, match=words):
+            env.step(np.zeros((2, 2)))
+    env.set_options({"config": {"duration": 0.5}})
+    env.reset()
+    ends = [env.step(np.zeros((2, 2)))[2].all() for _ in range(10)]
+    assert ends == [False] * 9 + [True]

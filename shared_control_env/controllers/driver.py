@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from time import perf_counter
 from typing import Any, Protocol, runtime_checkable
 
@@ -65,7 +66,7 @@ def checked_command(command: Any, who: str = "driver") -> np.ndarray:
         array = np.asarray(command, dtype=float)
     except (TypeError, ValueError):
         array = np.full(0, np.nan)
-    if array.shape != (2,) or not np.isfinite(array).all():
+    if array.shape != (2,) or not all(map(isfinite, array.tolist())):
         raise ValueError(f"{who}: act() gave {command!r}; it must give finite [a, delta] [m/s^2, rad], shape (2,)")
     return array
 
@@ -136,7 +137,7 @@ class PredictiveDriver:
         )
         result = self._solved()
         info = result.info
-        found = info.status_val == osqp.SolverStatus.OSQP_SOLVED and bool(np.isfinite(result.x[:2]).all())
+        found = info.status_val == osqp.SolverStatus.OSQP_SOLVED and all(map(isfinite, result.x[:2].tolist()))
         if found:
             self._last = np.clip(result.x[:2], -1.0, 1.0) * self._bounds
         else:

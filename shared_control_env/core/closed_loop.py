@@ -184,12 +184,6 @@ def is_on_road(scene: Record, p: Parameters) -> bool:
     return p.task.road_low <= scene.z[1] <= p.task.road_high
 
 
-@jit
-def has_run_out(scene: Record, steps: int, p: Parameters) -> bool:
-    """Whether an episode is truncated: by its duration of so many steps, or because the road ends."""
-    return scene.k >= steps or scene.z[0] >= p.task.road_end
-
-
 @jit_inlined
 def count_departures(scene: Record, p: Parameters, memory: Record) -> None:
     """Count in memory each time that the ego's centre leaves the lane to keep."""
@@ -210,7 +204,8 @@ def conclude(
     memory: Record,
     terms: np.ndarray,
     info: Record,
-) -> tuple[float, bool]:
+    steps: int,
+) -> tuple[float, bool, bool]:
     """Reward and end of a step, once the scene it led to is perceived.
 
     Args:
@@ -223,9 +218,11 @@ def conclude(
         memory: record of :data:`records.MEMORY`.
         terms: written, shape (7,).
         info: record of :data:`info.INFO`, completed.
+        steps: duration of the episode in time steps.
 
     Returns:
-        Reward, and whether the episode terminates: by a collision or off the road.
+        Reward; whether the episode terminates: by a collision, off the road, or in a state that is not finite; whether
+        it is truncated: by its duration, or since the road ends.
     """
     x = scene.state
     on_road = is_on_road(scene, p) and np.isfinite(x[0] + x[1] + x[2] + x[3] + x[4] + x[5])
@@ -233,4 +230,5 @@ def conclude(
     reward_terms(previous_s, scene, signals, last_a, terminated, p, terms)
     count_departures(scene, p, memory)
     note_outcome(scene.z[3], crashed, on_road, memory, terms, info)
-    return weighted_sum(terms, p.reward), terminated
+    truncated = scene.k >= steps or scene.z[0] >= p.task.road_end
+    return weighted_sum(terms, p.reward), terminated, truncated

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -117,13 +118,22 @@ def as_dict(info: np.ndarray) -> dict[str, Any]:
     """A record as a nested dict: plain numbers, and views of the record's arrays.
 
     Args:
-        info: of :data:`INFO` or a part of it, an array of no dimension.
+        info: of :data:`INFO` or a part of it, a 0-d array.
     """
-    values: dict[str, Any] = {}
-    for name in info.dtype.names or ():
-        value = info[name]
-        if value.dtype.names:
-            values[name] = as_dict(value)
-        else:
-            values[name] = value if value.ndim else value.item()
-    return values
+    return _named(info.item(), info.dtype)
+
+
+def _named(values: tuple[Any, ...], dtype: np.dtype) -> dict[str, Any]:
+    """A record's values by their names."""
+    names, nested = _fields(dtype)
+    named = dict(zip(names, values, strict=True))
+    for name, inner in nested:
+        named[name] = _named(named[name], inner)
+    return named
+
+
+@cache
+def _fields(dtype: np.dtype) -> tuple[tuple[str, ...], tuple[tuple[str, np.dtype], ...]]:
+    """Names of a record's fields, and those that are records themselves."""
+    names = dtype.names or ()
+    return names, tuple((name, dtype[name]) for name in names if dtype[name].names)

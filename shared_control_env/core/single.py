@@ -199,12 +199,6 @@ def note_start(scene: Record, parameters: Record, memory: Record, info_record: R
 
 
 @jit
-def has_run_out(scene: Record, steps: int, parameters: Record) -> bool:
-    """:func:`closed_loop.has_run_out`."""
-    return closed_loop.has_run_out(scene[()], steps, parameters[()])
-
-
-@jit
 def conclude(
     previous_s: float,
     last_a: float,
@@ -215,10 +209,11 @@ def conclude(
     memory: Record,
     terms: np.ndarray,
     info_record: Record,
-) -> tuple[float, bool]:
+    steps: int,
+) -> tuple[float, bool, bool]:
     """:func:`closed_loop.conclude`."""
     return closed_loop.conclude(
-        previous_s, last_a, crashed, scene[()], signals[()], parameters[()], memory[()], terms, info_record[()]
+        previous_s, last_a, crashed, scene[()], signals[()], parameters[()], memory[()], terms, info_record[()], steps
     )
 
 

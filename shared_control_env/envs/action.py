@@ -46,7 +46,7 @@ class SlotAction(ActionType):
         Raises:
             ValueError: if a slot is missing, unknown, of the wrong shape or not finite.
         """
-        if not isinstance(action, Mapping) or set(action) != set(SLOT_SPACES):
+        if not isinstance(action, dict | Mapping) or set(action) != set(SLOT_SPACES):
             raise ValueError(
                 f"action = {action!r} must be a dict with the keys {sorted(SLOT_SPACES)}; the wrappers "
                 "AuthorityLimiter and DriverModel bind one each"

@@ -278,6 +278,7 @@ class SharedControlEnv(HighwayEnv):
             self.memory,
             self._terms,
             self.noted,
+            self.episode_steps,
         )
         self.observation = self.observation_type.observe()
         reward, terminated, truncated = self._reward(action), self._is_terminated(), self._is_truncated()
@@ -312,7 +313,7 @@ class SharedControlEnv(HighwayEnv):
 
     def _is_truncated(self) -> bool:
         """End of the duration, counted in whole steps, or of the road."""
-        return single.has_run_out(self.scene, self.episode_steps, self.parameters)
+        return self._outcome[2]
 
     def _note_signals(self) -> np.ndarray:
         """A new record of info that holds the signals of the present time step."""

@@ -35,6 +35,9 @@ class Clipping:
 
     Args:
         num_envs: of how many environments.
+
+    Attributes:
+        in_a_row: whether any value of a slot was beyond its bounds in the step before, by the slot's name.
     """
 
     PATIENCE = 20
@@ -42,7 +45,7 @@ class Clipping:
 
     def __init__(self, num_envs: int = 1) -> None:
         self._steps = {slot: np.zeros(num_envs, dtype=int) for slot in SLOT_SPACES}
-        self._in_a_row = dict.fromkeys(SLOT_SPACES, False)
+        self.in_a_row = dict.fromkeys(SLOT_SPACES, False)
         self._told = False
 
     def note(self, slot: str, values: np.ndarray, beyond: bool) -> None:
@@ -54,15 +57,15 @@ class Clipping:
             beyond: whether any of them is beyond its bounds.
         """
         if not beyond:
-            if self._in_a_row[slot]:
+            if self.in_a_row[slot]:
                 self._steps[slot][:] = 0
-                self._in_a_row[slot] = False
+                self.in_a_row[slot] = False
             return
         low, high, _ = _BOUNDS[slot]
         steps = self._steps[slot]
         steps += 1
         steps[((values >= low) & (values <= high)).all(axis=1)] = 0
-        self._in_a_row[slot] = True
+        self.in_a_row[slot] = True
         if not self._told and steps.max() >= self.PATIENCE:
             self._told = True
             logger.warn(
@@ -90,7 +93,7 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
     """
     low, high, size = _BOUNDS[slot]
     try:
-        array = np.array(as_array(value), dtype=np.float64)
+        array = np.array(value if isinstance(value, np.ndarray) else as_array(value), dtype=np.float64)
     except (TypeError, ValueError):
         array = np.full(0, np.nan)
     values = array.tolist()
@@ -98,5 +101,7 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
         raise ValueError(
             f"action[{slot!r}] = {value!r} must be {size} finite number(s) in [{low:g}, {high:g}], shape ({size},)"
         )
-    clipping.note(slot, array[None], min(values) < low or max(values) > high)
+    beyond = min(values) < low or max(values) > high
+    if beyond or clipping.in_a_row[slot]:
+        clipping.note(slot, array[None], beyond)
     return array.clip(low, high, out=array)

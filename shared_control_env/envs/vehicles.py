@@ -175,6 +175,11 @@ def write_row(vehicle: Vehicle, row: np.ndarray) -> None:
     if isinstance(vehicle, LaneFollower):
         row[:] = vehicle.array
         return
+    if isinstance(vehicle, EgoVehicle):
+        row[X], row[Y], row[HEADING], row[SPEED], _, row[YAW_RATE] = vehicle.array.tolist()
+        row[ACCELERATION] = vehicle.action["acceleration"]
+        row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.LENGTH, vehicle.WIDTH
+        return
     row[X], row[Y] = vehicle.position
     row[HEADING], row[SPEED] = vehicle.heading, vehicle.speed
     row[ACCELERATION] = vehicle.action["acceleration"]

@@ -195,10 +195,9 @@ def advance_one(
     if resetting:
         note_start(i, batch, setup, out, work)
     else:
-        out.rewards[i], out.terminations[i] = closed_loop.conclude(
-            previous_s, last_a, batch.crashed[i], scene, signals, p, memory, work.terms, out.infos[i]
+        out.rewards[i], out.terminations[i], out.truncations[i] = closed_loop.conclude(
+            previous_s, last_a, batch.crashed[i], scene, signals, p, memory, work.terms, out.infos[i], setup.steps
         )
-        out.truncations[i] = closed_loop.has_run_out(scene, setup.steps, p)
     observe(scene, memory, batch.lines[i], p, out.observations[i])
 
 

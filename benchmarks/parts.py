@@ -85,10 +85,19 @@ def _driver(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray)
     for i in range(batch.scenes.shape[0]):
         p = batch.parameters[i]
         driver_qp.build_program(
-            batch.scenes[i], batch.memories[i].u_h_des, p, works[0].solver, g.P, g.q, g.A, g.low, g.high
+            batch.scenes[i],
+            batch.memories[i].u_h_des,
+            batch.memories[i].u_h_act,
+            p,
+            works[0].solver,
+            g.P,
+            g.q,
+            g.A,
+            g.low,
+            g.high,
         )
         n = 2 * p.driver.H_c + 1
-        m = 2 * p.driver.H_p + n
+        m = driver_qp.count_rows(p)
         solve_qp(n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set)
 
 

@@ -74,6 +74,9 @@ def checked_command(command: Any, who: str = "driver") -> np.ndarray:
 class PredictiveDriver:
     """The driver of Eq. 14-15: the automation's costs without the potential field, linearised, in OSQP.
 
+    With ``parameters.internal_model.active`` it knows its own response and feels the automation's command
+    (:mod:`core.driver_qp`); the paper's does not.
+
     The workspace is set up at every reset, so that episodes do not depend on those before, and updated in
     place at every step; anew after :data:`KEPT` steps. Where OSQP does not solve to tolerance the last feasible command
     is held.
@@ -91,7 +94,7 @@ class PredictiveDriver:
         self._parameters = pack(Parameters() if parameters is None else parameters)
         self._eps = eps
         n = 2 * int(self._parameters["driver"]["H_c"]) + 1
-        rows = 2 * int(self._parameters["driver"]["H_p"])
+        rows = 2 * int(self._parameters["driver"]["H_p"]) + int(self._parameters["internal_model"]["active"])
         self.P, self.q = np.zeros((n, n)), np.zeros(n)
         self.A = np.zeros((rows + n, n))
         self.low, self.high = np.zeros(rows + n), np.zeros(rows + n)
@@ -109,7 +112,7 @@ class PredictiveDriver:
         """Begin an episode; the predictive driver draws nothing, so the seed is not used."""
         self.failures = 0
         self.solution: Solution | None = None
-        self._last = np.zeros(2)
+        self._last, self._arm = np.zeros(2), np.zeros(2)
         self._solver: osqp.OSQP | None = None
         self._problems: list[tuple[np.ndarray, ...]] = []
 
@@ -119,6 +122,8 @@ class PredictiveDriver:
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired command u_h,des; see :class:`Driver`."""
+        if scene["k"] > 0:  # what the arm gives now, after a step under its last command
+            single.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
         self.solution = self.solve(scene)
         return self.solution.command
 
@@ -133,7 +138,7 @@ class PredictiveDriver:
         """
         begin = perf_counter()
         single.build_program(
-            scene, self._last, self._parameters, self._work, self.P, self.q, self.A, self.low, self.high
+            scene, self._last, self._arm, self._parameters, self._work, self.P, self.q, self.A, self.low, self.high
         )
         result = self._solved()
         info = result.info

@@ -28,8 +28,8 @@ SOLVED, ITERATION_LIMIT, FAILED = 0, 1, 2
 MAX_VARIABLES = 2 * MAX_CONTROL + 1
 """Most variables: the commands and one slack."""
 
-MAX_ROWS = 2 * MAX_HORIZON + MAX_VARIABLES
-"""Most rows: both sides of the safe area at every stage, and one bound a variable."""
+MAX_ROWS = 2 * MAX_HORIZON + 1 + MAX_VARIABLES
+"""Most rows: both sides of the safe area at every stage, its end, and one bound a variable."""
 
 UNBOUNDED = 1e20
 """Bounds from here on, infinite ones included, stand for none, as in OSQP: no row's value gets there."""

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from time import time
 from typing import Any
 
 from numba.core.caching import (
@@ -33,8 +32,8 @@ _PACKAGE = Path(__file__).parent.parent
 COMPILED = ("core", "vector")
 """Folders of the package that hold compiled functions."""
 
-KEPT = 30 * 24 * 3600.0
-"""Time that the compiled form of other sources is kept after its last use [s]."""
+KEPT = 8
+"""States of the sources whose compiled forms are kept, the last used ones."""
 
 
 def _digest_of_sources() -> str:
@@ -62,12 +61,12 @@ def _say_uncached(reason: object) -> None:
 
 @cache
 def _tidy(path: Path) -> None:
-    """Mark a cache folder as used now; remove those beside it that no process has used for long."""
+    """Mark a cache folder as used now; of those beside it remove all but the last used ones."""
     try:
         os.utime(path)
-        for other in path.parent.glob("shared_control_env-*"):
-            if time() - other.stat().st_mtime > KEPT:
-                shutil.rmtree(other, ignore_errors=True)
+        folders = sorted(path.parent.glob("shared_control_env-*"), key=lambda folder: folder.stat().st_mtime)
+        for folder in folders[:-KEPT]:
+            shutil.rmtree(folder, ignore_errors=True)
     except OSError:  # of another user, or removed by another process
         return
 

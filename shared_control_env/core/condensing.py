@@ -29,6 +29,7 @@ WORKSPACE = np.dtype(
         ("sensitivity", np.float64, (6, _N)),  # derivative of the state with respect to U
         ("yaw_step", np.float64, (_N,)),  # the same of the change of the yaw rate over the last step
         ("row", np.float64, (_N,)),  # derivative of one residual
+        ("gain", np.float64, (_N,)),  # derivative of the arm's command, of a driver who models it
         ("gradient", np.float64, (_N,)),  # of half the cost
         ("hessian", np.float64, (_N, _N)),  # Gauss-Newton, of half the cost
         ("step", np.float64, (_N,)),  # of the commands
@@ -72,7 +73,18 @@ def propagate(work: Record, n: int) -> None:
             ``yaw_step`` are written.
         n: columns in play: 2 for every command used so far.
     """
-    A, B, sens, yaw_step = work.A, work.B, work.sensitivity, work.yaw_step
+    B, sens, yaw_step = work.B, work.sensitivity, work.yaw_step
+    carry(work, n)
+    for column in range(2):
+        for i in range(6):
+            sens[i, n - 2 + column] += B[i, column]
+        yaw_step[n - 2 + column] += B[R, column]
+
+
+@jit_inlined
+def carry(work: Record, n: int) -> None:
+    """The part of :func:`propagate` that is ``A sens``; arguments as there."""
+    A, sens, yaw_step = work.A, work.sensitivity, work.yaw_step
     a_s = A[S, Y], A[S, PSI], A[S, V_X], A[S, V_Y], A[S, R]
     a_y = A[Y, Y], A[Y, PSI], A[Y, V_X], A[Y, V_Y], A[Y, R]
     a_psi = A[PSI, Y], A[PSI, PSI], A[PSI, V_X], A[PSI, V_Y], A[PSI, R]
@@ -88,10 +100,6 @@ def propagate(work: Record, n: int) -> None:
         sens[V_Y, c] = a_vy[0] * v_x + a_vy[1] * v_y + a_vy[2] * r
         r_next = a_r[0] * v_x + a_r[1] * v_y + a_r[2] * r
         sens[R, c], yaw_step[c] = r_next, r_next - r
-    for column in range(2):
-        for i in range(6):
-            sens[i, n - 2 + column] += B[i, column]
-        yaw_step[n - 2 + column] += B[R, column]
 
 
 @jit_inlined

@@ -9,18 +9,29 @@ the program is always feasible, and eps is 0 where the rows can be kept at a cos
 
     min  x^T P x / 2 + q^T x      subject to   low <= A x <= high,    x = [U / bound, eps]
     rows:  y(i) - eps <= upper(i),   y(i) + eps >= lower(i),   -1 <= U / bound <= 1,   eps >= 0
+
+The paper's driver takes its desired command for the one that drives the car, and so knows neither its own lag nor the
+automation beside it. With the internal model both are in the program, the variables still being u_h,des::
+
+    u(i)         = u_a,act + u_h,act(i)             u_a,act: as felt last, held over the horizon
+    u_h,act(i+1) = phi u_h,act(i) + K_h (1 - phi) (u_h,des(i) - u_a,act),   phi = exp(-dt / T_h)
+    z(i+1)       = A z(i) + B u(i) + affine
+
+with K_h and T_h as the driver believes them to be. What counts as effort is then the command that drives the car, at
+the H_c stages from the first that can be changed on, and a little of u_h,des. One more row keeps s(H_p) - eps in C,
+whose end is the clearance behind the preceding vehicle; the paper's program keeps the lateral position alone in C.
 """
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, exp, sin
 
 import numpy as np
 
 from shared_control_env.core.active_set_qp import UNBOUNDED
-from shared_control_env.core.condensing import add_effort, add_tracking, clear, propagate
+from shared_control_env.core.condensing import add_effort, add_square, add_tracking, carry, clear, propagate
 from shared_control_env.core.dynamics import PSI, V_X, V_Y, R, S, Y, implicit_step_jacobian
-from shared_control_env.core.jit import jit_inlined
+from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import Record
 from shared_control_env.core.safe_area import lateral_bounds
@@ -37,10 +48,46 @@ SLACK_QUADRATIC = 1.0
 """Curvature of the slack's penalty [1/m^2], which makes the program strictly convex."""
 
 
+SHARE_OF_DESIRED = 0.01
+"""Weight of u_h,des over that of the command that drives the car, in the program with the internal model."""
+
+
+@jit
+def count_rows(p: Parameters) -> int:
+    """Rows of the program: both sides of C at every stage, C's end with the internal model, and one a variable."""
+    return 2 * p.driver.H_p + (1 if p.internal_model.active else 0) + 2 * p.driver.H_c + 1
+
+
+@jit_inlined
+def add_arm(i: int, command: tuple[float, float], p: Parameters, n: int, work: Record) -> None:
+    """The command u(i) that drives the car at stage i, of a driver with the internal model: its effects and its effort.
+
+    Args:
+        i: stage.
+        command: u(i) where u_h,des is zero [m/s^2, rad].
+        p: parameters.
+        n: columns of the program.
+        work: record of :data:`condensing.WORKSPACE`: ``gain`` holds du_h,act(i)/dU; the sensitivities of the next state
+            and the quadratic model are added to.
+    """
+    B, sens, gain = work.B, work.sensitivity, work.gain
+    for c in range(n):
+        for j in range(6):
+            sens[j, c] += B[j, c % 2] * gain[c]
+        work.yaw_step[c] += B[R, c % 2] * gain[c]
+    if i < 1 or i > p.driver.H_c:
+        return
+    for channel in range(2):
+        for c in range(work.row.shape[0]):
+            work.row[c] = gain[c] if c % 2 == channel and c < n else 0.0
+        add_square(work, p.driver.Q_a if channel == 0 else p.driver.Q_delta, command[channel], n)
+
+
 @jit_inlined
 def build_program(
     scene: Record,
     u_last: np.ndarray,
+    u_h_act: np.ndarray,
     p: Parameters,
     work: Record,
     P: np.ndarray,
@@ -53,13 +100,14 @@ def build_program(
 
     Args:
         scene: record of :data:`records.SCENE`, its safe area found.
-        u_last: the last command u(k-1), about which the model is linearised, shape (2,).
+        u_last: the driver's last desired command, about which the paper's model is linearised, shape (2,).
+        u_h_act: what the arm gives now, u_h,act(k), about which, with the automation's, the other is, shape (2,).
         p: parameters.
         work: record of :data:`condensing.WORKSPACE`.
         P: written, symmetric, shape (n + 1, n + 1) with n = 2 H_c.
         q: written, shape (n + 1,).
-        A: written, shape (2 H_p + n + 1, n + 1).
-        low, high: written, shape (2 H_p + n + 1,).
+        A: written, shape (:func:`count_rows`, n + 1).
+        low, high: written, of as many entries.
     """
     w, dt = p.driver, p.task.dt
     n = 2 * w.H_c
@@ -69,11 +117,20 @@ def build_program(
     clear(work, n)
     for i in range(6):
         z[i] = scene.z[i]
+    internal = p.internal_model.active
+    phi = exp(-dt / p.internal_model.T_h)
+    rise = p.internal_model.K_h * (1.0 - phi)
+    arm_a, arm_delta = u_h_act[0], u_h_act[1]
+    a, delta = u_last[0], u_last[1]
+    if internal:
+        a, delta = scene.felt[0] + arm_a, scene.felt[1] + arm_delta
+        for c in range(n):
+            work.gain[c] = 0.0
     # A command that would stop the car within the step hides that it can start off: linearise at rest.
-    a = max(u_last[0], -z[V_X] / dt - z[R] * z[V_Y])
-    delta = u_last[1]
+    a = max(a, -z[V_X] / dt - z[R] * z[V_Y])
     heading, wheel = (cos(scene.z[PSI]), sin(scene.z[PSI])), (cos(delta), sin(delta))
-    for i in range(2 * H_p + n + 1):
+    rows = count_rows(p)
+    for i in range(rows):
         for c in range(n + 1):
             A[i, c] = 0.0
     for i in range(H_p):
@@ -91,12 +148,29 @@ def build_program(
             z_next[j] = affine[j]
             for m in range(6):
                 z_next[j] += work.A[j, m] * z[m]
-        propagate(work, columns)
+        if internal:
+            command = scene.felt[0] + arm_a, scene.felt[1] + arm_delta
+            for j in range(6):
+                z_next[j] += work.B[j, 0] * command[0] + work.B[j, 1] * command[1]
+            carry(work, n)
+            add_arm(i, command, p, n, work)
+            columns = n
+            arm_a = phi * arm_a - rise * scene.felt[0]
+            arm_delta = phi * arm_delta - rise * scene.felt[1]
+            for c in range(n):
+                work.gain[c] *= phi
+            for channel in range(2):
+                work.gain[2 * min(i, w.H_c - 1) + channel] += rise
+        else:
+            propagate(work, columns)
         add_tracking(work, w, dt, z, z_next, scene.y_target, scene.v_target, columns)
         # The rows of C are taken where the car gets to under the last command.
         station = z_next[S]
         for c in range(columns):
-            station += sens[S, c] * (a if c % 2 == 0 else delta)
+            if internal:
+                station += sens[S, c] * u_last[c % 2]
+            else:
+                station += sens[S, c] * (a if c % 2 == 0 else delta)
             bound = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
             A[i, c] = sens[Y, c] * bound
             A[H_p + i, c] = A[i, c]
@@ -105,13 +179,23 @@ def build_program(
         low[i], high[i] = -UNBOUNDED, upper - z_next[Y]
         low[H_p + i], high[H_p + i] = lower - z_next[Y], UNBOUNDED
         z, z_next = z_next, z
-    for j in range(w.H_c):
-        work.trial[j, 0] = work.trial[j, 1] = 0.0
-    add_effort(work, w, work.trial)
+    first = 2 * H_p
+    if internal:
+        for c in range(n):
+            A[first, c] = sens[S, c] * (p.limits.a_max if c % 2 == 0 else p.limits.delta_max)
+        A[first, n] = -1.0
+        low[first], high[first] = -UNBOUNDED, scene.area.end - z[S]
+        first += 1
+        for c in range(n):
+            work.hessian[c, c] += SHARE_OF_DESIRED * (w.Q_a if c % 2 == 0 else w.Q_delta)
+    else:
+        for j in range(w.H_c):
+            work.trial[j, 0] = work.trial[j, 1] = 0.0
+        add_effort(work, w, work.trial)
     for c in range(n + 1):
-        A[2 * H_p + c, c] = 1.0
-        low[2 * H_p + c], high[2 * H_p + c] = -1.0, 1.0
-    low[2 * H_p + n], high[2 * H_p + n] = 0.0, UNBOUNDED
+        A[first + c, c] = 1.0
+        low[first + c], high[first + c] = -1.0, 1.0
+    low[first + n], high[first + n] = 0.0, UNBOUNDED
     for c in range(n):
         P[c, n] = P[n, c] = 0.0
     for c in range(n):

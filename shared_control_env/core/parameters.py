@@ -202,6 +202,20 @@ class DriverLagParameters(NamedTuple):
     T_h: Positive = 0.2
 
 
+class InternalModelParameters(NamedTuple):
+    """What the predictive driver knows of its own arm (Eq. 16 within Eq. 15); ours, the paper's driver knows nothing.
+
+    Attributes:
+        active: whether the response is part of the model that the driver predicts with.
+        K_h: gain that the driver believes to have [-].
+        T_h: time constant that the driver believes to have [s].
+    """
+
+    active: bool = False
+    K_h: Annotated[float, Interval(ge=0.0, le=100.0)] = 1.0
+    T_h: Positive = 0.2
+
+
 IDENTIFIED_DRIVERS: dict[str, DriverLagParameters] = {
     "driver_1": DriverLagParameters(0.95, 0.15),
     "driver_2": DriverLagParameters(1.15, 0.21),
@@ -361,6 +375,7 @@ class Parameters(NamedTuple):
         longitudinal: longitudinal risk.
         law: tolerances of the authority law.
         lag: the driver's response.
+        internal_model: what the driver knows of it.
         reward: weights of the reward.
         task: lane, speed and time step.
         authority: operators, law and solver iterations.
@@ -375,6 +390,7 @@ class Parameters(NamedTuple):
     longitudinal: LongitudinalRiskParameters = LongitudinalRiskParameters()
     law: LawParameters = LawParameters()
     lag: DriverLagParameters = DriverLagParameters()
+    internal_model: InternalModelParameters = InternalModelParameters()
     reward: RewardParameters = RewardParameters()
     task: TaskParameters = TaskParameters()
     authority: AuthorityParameters = AuthorityParameters()

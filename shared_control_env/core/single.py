@@ -11,6 +11,7 @@ import numpy as np
 from shared_control_env.core import (
     automation_mpc,
     closed_loop,
+    driver_lag,
     driver_qp,
     dynamics,
     fuzzy,
@@ -221,6 +222,7 @@ def conclude(
 def build_program(
     scene: Record,
     u_last: np.ndarray,
+    u_h_act: np.ndarray,
     parameters: Record,
     work: Record,
     P: np.ndarray,
@@ -230,4 +232,11 @@ def build_program(
     high: np.ndarray,
 ) -> None:
     """:func:`driver_qp.build_program`."""
-    driver_qp.build_program(scene[()], u_last, parameters[()], work[()], P, q, A, low, high)
+    driver_qp.build_program(scene[()], u_last, u_h_act, parameters[()], work[()], P, q, A, low, high)
+
+
+@jit
+def advance_arm(u_h_act: np.ndarray, u_h_des: np.ndarray, u_a_act: np.ndarray, parameters: Record) -> None:
+    """:func:`driver_lag.advance_lag` of a driver's arm."""
+    p = parameters[()]
+    driver_lag.advance_lag(u_h_act, u_h_des, u_a_act, p.task.dt, p.lag)

@@ -90,6 +90,9 @@ DRIVERS: dict[str, DriverEntry] = {
         f"mpc_{i}": DriverEntry(f"predictive driver, lag of identified driver {i}", config=_lag(f"driver_{i}"))
         for i in range(1, 6)
     },
+    "internal_model": DriverEntry(
+        "predictive driver who knows its own lag and feels the automation", config={"internal_model": {"active": True}}
+    ),
     "scripted": DriverEntry("Stanley's law, speed and distance by the Intelligent Driver Model", ScriptedDriver),
     "distracted": DriverEntry("lets go until 1 s after the authority falls, then recovers", DistractedDriver),
     "over_reacting": DriverEntry("the scripted driver, 2.5 times as hard", OverreactingDriver),

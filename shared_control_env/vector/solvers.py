@@ -16,7 +16,7 @@ from numba.core.ccallback import CFunc
 
 from shared_control_env.core import active_set_qp, closed_loop, condensing
 from shared_control_env.core.cache import cache_of
-from shared_control_env.core.driver_qp import build_program
+from shared_control_env.core.driver_qp import build_program, count_rows
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, Record, record_dtype
 from shared_control_env.core.safe_area import Scratch, search_triangles, triangulate_compiled
@@ -101,9 +101,8 @@ def drive(scene: Record, p: Parameters, memory: Record, work: Record, program: R
         report: record of :data:`records.SOLVER`, written.
     """
     g = program
-    build_program(scene, memory.u_h_des, p, work.solver, g.P, g.q, g.A, g.low, g.high)
-    n = 2 * p.driver.H_c + 1
-    m = 2 * p.driver.H_p + n
+    build_program(scene, memory.u_h_des, memory.u_h_act, p, work.solver, g.P, g.q, g.A, g.low, g.high)
+    n, m = 2 * p.driver.H_c + 1, count_rows(p)
     status, iterations, primal, dual = active_set_qp.solve_qp(
         n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set
     )

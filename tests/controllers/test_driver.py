@@ -1,13 +1,15 @@
 import copy
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shared_control_env.controllers import Automation, Driver, PredictiveDriver
-from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.parameters import InternalModelParameters, Parameters
 from shared_control_env.core.records import pack
+from shared_control_env.wrappers import DriverModel
 from tests.scenes import random_state, scene_of, traffic
 
 PARAMETERS = pack(Parameters())
@@ -122,3 +124,34 @@ def test_driver_starts_off(speed):
     assert driver.solve(scene).command[0] > 1.0
     driver._last = np.array([-5.0, 0.0])
     assert driver.solve(scene).command[0] > 1.0
+
+
+KNOWING = Parameters(internal_model=InternalModelParameters(active=True))
+
+
+def test_the_driver_with_the_internal_model_brakes_for_the_end_of_the_safe_area():
+    """In the middle of the lane at the target speed there is nothing to do, but for the end of C."""
+    commands = []
+    for end in (1.0, 4.0, 55.0):
+        scene = scene_of(np.array([0.0, 0.0, 0.0, 15.0, 0.0, 0.0]), pack(KNOWING))
+        scene["area"]["end"] = end
+        commands.append(PredictiveDriver(KNOWING).solve(scene).command[0])
+    assert commands[2] == pytest.approx(0.0, abs=0.02)
+    assert commands[0] < commands[2] - 1.0
+    assert commands[1] < commands[2] - 1.0
+
+
+def test_the_driver_with_the_internal_model_undoes_what_it_feels():
+    """It asks for the command that cancels the automation's, where the paper's driver asks for nothing."""
+    scene = scene_of(np.array([0.0, 0.0, 0.0, 15.0, 0.0, 0.0]), pack(KNOWING))
+    scene["felt"] = [0.0, 0.05]
+    assert PredictiveDriver(KNOWING).solve(scene).command[1] < -0.02
+    assert PredictiveDriver().solve(scene).command[1] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_its_arm_is_the_one_of_the_loop():
+    env = DriverModel(gym.make("SharedControl/Bend-v0", config={"internal_model": {"active": True}}))
+    env.reset(seed=0)
+    for _ in range(60):
+        info = env.step(0)[4]
+        np.testing.assert_allclose(env.driver._arm, info["u_h_act"], atol=1e-12)

@@ -20,7 +20,7 @@ from shared_control_env.core.active_set_qp import (
     WORKSPACE,
     solve_qp_array,
 )
-from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.parameters import InternalModelParameters, Parameters
 from shared_control_env.core.records import SCENE, pack
 from shared_control_env.core.safe_area import triangulate
 
@@ -312,9 +312,9 @@ def test_arrays_may_be_longer_and_the_workspace_is_reused() -> None:
         assert np.isnan(multipliers[m:]).all()
 
 
-def driver_program(rng: Generator, H_c: int, H_p: int) -> Program:
+def driver_program(rng: Generator, H_c: int, H_p: int, internal: bool = False) -> Program:
     """The driver's program of a random scene in a lane of 4 m; where |y| > 2 the car is outside, and slack is needed."""
-    parameters = Parameters()
+    parameters = Parameters(internal_model=InternalModelParameters(active=internal))
     parameters = pack(parameters._replace(driver=parameters.driver._replace(H_c=H_c, H_p=H_p)))
     scene = np.zeros((), SCENE)
     y, psi = rng.uniform(-2.5, 2.5), rng.uniform(-0.1, 0.1)
@@ -323,12 +323,13 @@ def driver_program(rng: Generator, H_c: int, H_p: int) -> Program:
     scene["v_target"] = rng.uniform(0.0, 30.0)
     scene["region"] = [0.0, 40.0, -2.0, 2.0]
     single.search(triangulate(0.0, 40.0, -2.0, 2.0, np.empty((0, 4, 2))), parameters, scene)
-    n, rows = 2 * H_c + 1, 2 * H_p
+    scene["felt"] = rng.uniform([-2.0, -0.1], [2.0, 0.1])
+    n, rows = 2 * H_c + 1, 2 * H_p + internal
     P, q, A = np.zeros((n, n)), np.zeros(n), np.zeros((rows + n, n))
     low, high = np.zeros(rows + n), np.zeros(rows + n)
     u_last = rng.uniform([-5.0, -0.1], [5.0, 0.1])
     work = np.zeros((), condensing.WORKSPACE)
-    single.build_program(scene, u_last, parameters, work, P, q, A, low, high)
+    single.build_program(scene, u_last, 0.5 * u_last, parameters, work, P, q, A, low, high)
     return P, q, A, low, high
 
 
@@ -377,5 +378,5 @@ def test_driver_programs_agree_with_osqp(H_c: int, H_p: int, count: int, unsolve
 
 def test_driver_programs_have_certificates() -> None:
     rng = np.random.default_rng(13)
-    for _ in range(2000):
-        assert_solved(driver_program(rng, 3, 10))
+    for i in range(2000):
+        assert_solved(driver_program(rng, 3, 10, internal=i % 2 == 1))

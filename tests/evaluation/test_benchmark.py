@@ -15,7 +15,16 @@ from rich.console import Console
 
 from shared_control_env.cli import summary
 from shared_control_env.controllers.scripted import ScriptedDriver
-from shared_control_env.evaluation import AUTHORITIES, DRIVERS, METRICS, SUITES, AuthorityEntry, Suite, evaluate
+from shared_control_env.evaluation import (
+    AUTHORITIES,
+    DRIVERS,
+    METRICS,
+    SUITES,
+    AuthorityEntry,
+    DriverEntry,
+    Suite,
+    evaluate,
+)
 from shared_control_env.evaluation import runner as runner_module
 from shared_control_env.evaluation.episodes import Batch
 from shared_control_env.evaluation.storage import IDENTITY, ResultsFolder, write_atomically
@@ -290,3 +299,25 @@ def test_the_printed_table_counts_every_failure_and_fits_a_terminal():
 
 
 METERED = {"lateral_rms": 0.123, "driver_effort": 0.0456}
+
+
+def test_the_driver_who_knows_the_own_lag_does_not_fail():
+    """The predictive driver of the paper alone leaves the road in half of the episodes; knowing its lag, it stays."""
+    laws = ["driver_only", "none", "proportional", "paper"]
+    table = evaluate("internal_model", laws, "full", seeds=[1])
+    assert len(table) == 4 * 136
+    assert table["terminated"].mean() <= 0.005
+    assert not table.loc[table["degradation"] == "none", "terminated"].any()
+    alone = evaluate(["mpc", "internal_model"], "driver_only", "full", seeds=[1]).groupby("driver")
+    assert alone["terminated"].mean()["mpc"] > 0.3
+    assert alone["lateral_rms"].mean()["internal_model"] < 0.3 * alone["lateral_rms"].mean()["mpc"]
+    case_2 = evaluate("internal_model", "driver_only", Suite("case 2", ("curve",), (None,)))
+    assert case_2["lateral_max"].max() < 0.1
+
+
+@pytest.mark.parametrize(("gain", "time"), [(0.8, 0.8), (0.8, 1.2), (1.2, 0.8), (1.2, 1.2)])
+def test_a_driver_who_is_wrong_about_the_own_lag_seldom_fails(gain, time):
+    believes = {"internal_model": {"active": True, "K_h": 1.0, "T_h": 0.2}}
+    entry = DriverEntry("wrong", config={**believes, "driver_lag": {"K_h": gain, "T_h": 0.2 * time}})
+    table = evaluate({"wrong": entry}, ["driver_only", "none", "proportional", "paper"], "full", seeds=[2])
+    assert table["terminated"].mean() <= 0.05

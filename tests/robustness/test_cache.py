@@ -130,15 +130,13 @@ def test_a_full_disk_is_said_once(monkeypatch, capsys):
     assert capsys.readouterr().err.count("No space left on device") == 1
 
 
-def test_old_folders_are_removed_after_their_time(tmp_path):
-    old, recent, own = (tmp_path / f"shared_control_env-{name}" for name in ("old", "recent", "own"))
-    for folder in (old, recent, own):
+def test_the_last_used_folders_are_kept(tmp_path):
+    folders = [tmp_path / f"shared_control_env-{i}" for i in range(12)]
+    for i, folder in enumerate(folders):
         folder.mkdir()
-    os.utime(old, (0, 0))
-    cache._tidy(own)
-    assert not old.exists()
-    assert recent.exists()
-    assert own.exists()
+        os.utime(folder, (1000 * i, 1000 * i))
+    cache._tidy(folders[0])  # the oldest, used now
+    assert [folder.exists() for folder in folders] == [True, *[False] * 4, *[True] * 7]
 
 
 INTERPRETED = """

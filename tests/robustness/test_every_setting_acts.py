@@ -44,6 +44,8 @@ BESIDE = {
     "degradations": {"duration": 4.0, "vehicles": [], "faults": [], "randomise": []},
     "task.target_speed": {"randomise": []},
     "reward.conflict": {"authority": {"law": "none"}},
+    "internal_model.K_h": {"internal_model": {"active": True}},
+    "internal_model.T_h": {"internal_model": {"active": True}},
 }
 VALUES = {
     "road.segments": [{"length": 30.0, "curvature": 0.0}, {"length": 100.0, "curvature": 0.01}],
@@ -66,6 +68,8 @@ VALUES = {
     "task.target_speed": 5.0,
     "vehicle.l_r": 1.1,
     "vehicle.C_r": 70_000.0,
+    "internal_model.K_h": 0.7,
+    "internal_model.T_h": 0.3,
 }
 # Refused beside these settings, by name; what is told is checked too.
 REFUSED = {"other_vehicles_type": "knows no plans", "neighbour_vehicles_connected_lanes": "would not act"}
@@ -165,12 +169,13 @@ def other_value(path, config):
 @pytest.mark.parametrize("path", [path for path in LEAVES if path.split(".")[0] not in NOT_DRAWN])
 def test_it_can_be_drawn_or_is_refused(path):
     config = configuration.merge(configuration.plain(Settings()), {**BUSY, "randomise": []})
+    config = configuration.merge(config, BESIDE.get(path, {}) if path.startswith("internal_model") else {})
     present = configuration.changes.at(config, tuple(path.split(".")))
-    if not is_number(present):
+    if not is_number(VALUES.get(path, present)):
         with pytest.raises(ValueError, match=r"no number|must have"):
             configuration.check({**config, "randomise": [{"setting": path, "low": 0.0, "high": 1.0}]})
         return
-    value = VALUES.get(path, other(present))
+    value = VALUES[path] if path in VALUES else other(present)
     config["randomise"] = [{"setting": path, "choices": [value]}]
     env, error = tried(lambda: gym.make("SharedControl/TwoLane-v0", config=config))
     if error is None:
@@ -188,7 +193,8 @@ def is_number(value):
 
 @pytest.mark.parametrize("path", LEAVES)
 def test_assigned_to_the_config_it_counts_from_the_next_reset_on(path):
-    env = gym.make("SharedControl/TwoLane-v0", config=BUSY).unwrapped
+    busy = {**BUSY, **BESIDE[path]} if path.startswith("internal_model") and path in BESIDE else BUSY
+    env = gym.make("SharedControl/TwoLane-v0", config=busy).unwrapped
     config = configuration.merge(configuration.plain(Settings()), BUSY)
     value = VALUES[path] if path in VALUES else other_value(path, config)
     *sections, last = path.split(".")

@@ -180,17 +180,18 @@ def test_same_for_an_allocator():
         np.testing.assert_allclose(infos["u_h_des"][1], info["u_h_des"], atol=2e-3)
 
 
-@pytest.mark.parametrize("name", IDS)
-def test_driver_in_the_kernel_is_the_predictive_driver(name):
-    single = DriverModel(gym.make(name))
-    many = gym.make_vec(name, num_envs=2, driver=True)
+@pytest.mark.parametrize("config", [{}, {"internal_model": {"active": True}, "authority": {"law": "proportional"}}])
+@pytest.mark.parametrize("name", [*IDS, "SharedControl/Bend-v0"])
+def test_driver_in_the_kernel_is_the_predictive_driver(name, config):
+    single = DriverModel(gym.make(name, config=config))
+    many = gym.make_vec(name, num_envs=2, driver=True, config=config)
     single.reset(seed=0)
     many.reset(seed=0)
     done = False
     while not done:
         _, _, terminated, truncated, info = single.step(0)
         infos = many.step(None)[4]
-        np.testing.assert_allclose(infos["z"][0], info["z"], atol=2e-3)
+        np.testing.assert_allclose(infos["z"][0], info["z"], atol=2e-2)  # OSQP stops at 1e-5
         assert infos["driver"]["status"][0] == 0
         assert infos["driver"]["primal_residual"][0] < 1e-8
         assert infos["driver"]["dual_residual"][0] < 1e-6

@@ -282,6 +282,11 @@ def _check_idle(settings: Settings) -> None:
     _refuse_idle(name, risk, "sigma_x", risk.preset == "paper", "it is of the preset 'paper'")
     for field in ("w_f_change", "w_l_change", "w_p_change"):
         _refuse_idle(name, risk, field, settings.lane_change is not None, "there is no config['lane_change']")
+    for field in ("K_h", "T_h"):
+        model = settings.internal_model
+        _refuse_idle(
+            "config['internal_model']", model, field, model.active, "the driver has no internal model (active)"
+        )
     for field in ("tolerance_a", "tolerance_delta"):
         law = settings.authority.law
         _refuse_idle("config['law_tolerances']", settings.law_tolerances, field, law == "paper", f"the law is {law!r}")

@@ -147,6 +147,14 @@ class AuthoritySettings(Section):
     operators: Literal[OPERATORS] = "product-sum"
 
 
+class InternalModelSettings(Section):
+    """Whether the predictive driver knows its own response (core.driver_qp), and what it believes of it."""
+
+    active: bool = False
+    K_h: Annotated[float, Interval(ge=0.0, le=100.0)] | None = None  # [-]; None for that of driver_lag
+    T_h: Positive | None = None  # [s]; None for that of driver_lag
+
+
 class SolverSettings(Section):
     """Gauss-Newton iterations of the automation."""
 
@@ -208,6 +216,7 @@ class Settings(Section):
     solver: SolverSettings = SolverSettings()
     driver: _Driver = _Driver()
     driver_lag: _Lag = _Lag()
+    internal_model: InternalModelSettings = InternalModelSettings()
     limits: _Limits = _Limits()
     vehicle: _Vehicle = _Vehicle()
     reward: _Reward = _Reward()

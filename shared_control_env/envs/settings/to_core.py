@@ -35,6 +35,11 @@ def parameters_of(settings: Settings) -> core.Parameters:
         longitudinal=core.LongitudinalRiskParameters(**longitudinal),
         law=core.LawParameters(**values(settings.law_tolerances)),
         lag=core.DriverLagParameters(**values(settings.driver_lag)),
+        internal_model=core.InternalModelParameters(
+            active=settings.internal_model.active,
+            K_h=settings.driver_lag.K_h if settings.internal_model.K_h is None else settings.internal_model.K_h,
+            T_h=settings.driver_lag.T_h if settings.internal_model.T_h is None else settings.internal_model.T_h,
+        ),
         reward=core.RewardParameters(**values(settings.reward)),
         task=core.TaskParameters(
             **values(settings.task),

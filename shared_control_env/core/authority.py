@@ -14,7 +14,7 @@ PAPER, PROPORTIONAL, NONE, DRIVER_ONLY = range(4)
 
 
 @jit
-def limit_channel(u_des: float, u_f: float, alpha: float, tolerance: float) -> float:
+def limit_channel(u_des: float, u_f: float, alpha: float, tolerance: float, strict: bool) -> float:
     """Eq. 10 for one channel.
 
     ::
@@ -27,18 +27,23 @@ def limit_channel(u_des: float, u_f: float, alpha: float, tolerance: float) -> f
     about 0 and the ratio is noise, so equality is ``|u_f - u_des| <= tolerance`` in physical units.
     Within it u_f is still kept to ``|u_act| <= |u_des|``, which the text asserts of all three lines.
 
+    Readings of the second line: as printed it does not hold for alpha = 1, where a degraded command smaller than the
+    desired one would then be raised to it by the third line; or it does, so that nothing jumps as alpha reaches 1.
+    The latter is the default, ``strict`` the former.
+
     Args:
         u_des: desired command.
         u_f: degraded command, same unit.
         alpha: authority in [0, 1].
         tolerance: in the unit of the command.
+        strict: whether the second line is as printed.
 
     Returns:
         Actual command of the automation.
     """
     if abs(u_f - u_des) <= tolerance:
         return min(max(u_f, -abs(u_des)), abs(u_des))
-    if u_f * u_des > 0.0 and abs(u_f) < alpha * abs(u_des):
+    if u_f * u_des > 0.0 and abs(u_f) < alpha * abs(u_des) and (alpha < 1.0 or not strict):
         return u_f
     return alpha * u_des
 
@@ -60,8 +65,8 @@ def apply_law(
         u_act: written, shape (2,).
     """
     if law == PAPER:
-        u_act[0] = limit_channel(u_des[0], u_f[0], alpha, parameters.tolerance_a)
-        u_act[1] = limit_channel(u_des[1], u_f[1], alpha, parameters.tolerance_delta)
+        u_act[0] = limit_channel(u_des[0], u_f[0], alpha, parameters.tolerance_a, parameters.strict)
+        u_act[1] = limit_channel(u_des[1], u_f[1], alpha, parameters.tolerance_delta, parameters.strict)
         return
     gain = 0.0
     if law == PROPORTIONAL:

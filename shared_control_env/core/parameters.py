@@ -184,10 +184,12 @@ class LawParameters(NamedTuple):
     Attributes:
         tolerance_a: |a_f - a_des| still counted as equal [m/s^2].
         tolerance_delta: |delta_f - delta_des| still counted as equal [rad].
+        strict: whether the second line holds with full authority too; printed is alpha < 1.
     """
 
     tolerance_a: NonNegative = 0.01
     tolerance_delta: NonNegative = 0.001
+    strict: bool = False
 
 
 class DriverLagParameters(NamedTuple):
@@ -274,6 +276,10 @@ class TaskParameters(NamedTuple):
         road_end: path length at which the road ends, and with it the episode [m].
         y_target: lateral position of the lane to keep [m].
         target_speed: speed to drive where no slower vehicle precedes [m/s]; Case 1 (15 m/s).
+        time_headway: gap to keep over the speed [s], 0 for none: the paper's target speed is that of the preceding
+            vehicle, whatever the distance. 1.2 s is usual (ISO 15622 has at least 0.8 s).
+        standstill_gap: gap to keep at rest, bumper to bumper [m]; ours.
+        closing_time: time in which a gap that is too large or too small is to be closed [s]; ours.
         y_goal: lateral position of the lane to change to [m].
         change_onset: when the lane change begins [s]; infinite for none.
         change_duration: of the lane change [s]; ours.
@@ -287,6 +293,9 @@ class TaskParameters(NamedTuple):
     road_end: Positive = math.inf
     y_target: float = 0.0
     target_speed: TargetSpeed = 15.0
+    time_headway: Annotated[float, Interval(ge=0.0, le=10.0)] = 0.0
+    standstill_gap: NonNegative = 4.0
+    closing_time: Annotated[float, Interval(ge=0.1, le=100.0)] = 1.5
     y_goal: float = 0.0
     change_onset: NonNegative = math.inf
     change_duration: Positive = 4.0

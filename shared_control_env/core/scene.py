@@ -9,7 +9,7 @@ import numpy as np
 from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.lane_change import change_progress
 from shared_control_env.core.longitudinal_risk import FOLLOWER, LEADER, PRECEDING
-from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.parameters import Parameters, TaskParameters
 from shared_control_env.core.records import (
     BODY_LENGTH,
     BODY_WIDTH,
@@ -82,10 +82,34 @@ def find_neighbours(
 
 
 @jit
+def following_speed(v_lead: float, gap: float, v: float, task: TaskParameters) -> float:
+    """Target speed behind a vehicle [m/s]: its own, or the one that brings the gap to a time headway.
+
+    ::
+
+        v_target = v_lead                                      as the paper has it ("drive consistently")
+        v_target = v_lead + (gap - d_0 - tau_h v) / tau_g      with a time headway tau_h
+
+    within 0 and the task's target speed; a constant time gap (Ioannou & Chien, Autonomous Intelligent Cruise Control,
+    IEEE Transactions on Vehicular Technology 42(4), 1993).
+
+    Args:
+        v_lead: speed of the vehicle ahead along the road [m/s].
+        gap: to it, bumper to bumper [m].
+        v: own speed [m/s].
+        task: headway, standstill gap d_0, closing time tau_g and target speed.
+    """
+    v_target = v_lead
+    if task.time_headway > 0.0:
+        v_target += (gap - task.standstill_gap - task.time_headway * v) / task.closing_time
+    return min(task.target_speed, max(v_target, 0.0))
+
+
+@jit
 def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p: Parameters, scene: Record) -> None:
     """Fill the scene at one time step, but for its safe area.
 
-    The target speed is the preceding vehicle's where that is slower (Section VI: "follow the
+    The target speed is that of :func:`following_speed` behind a vehicle (Section VI: "follow the
     preceding"). The driving region is the lane to keep, from the ego to d_o behind the preceding
     vehicle's rear or to the look-ahead (Section III-B). During a lane change it is both lanes, to the look-ahead,
     with the vehicles as holes; the lane to keep is the old one for its first half and the new one from then on.
@@ -116,7 +140,8 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
     scene.v_target = task.target_speed
     end = s_e + p.safe_area.look_ahead
     if preceding[PRESENT] > 0.0:
-        scene.v_target = min(task.target_speed, max(preceding[NEAR_SPEED], 0.0))
+        bodies = 0.5 * (p.vehicle.length + traffic[int(preceding[NEAR_ROW]), BODY_LENGTH])
+        scene.v_target = following_speed(preceding[NEAR_SPEED], preceding[NEAR_S] - s_e - bodies, state[3], task)
         if not scene.changing:
             rear = preceding[NEAR_S] - 0.5 * traffic[int(preceding[NEAR_ROW]), BODY_LENGTH]
             end = min(end, rear - p.safe_area.d_o)

@@ -17,20 +17,27 @@ def actual(law, u_des, u_f, alpha):
 
 @given(command, command, st.floats(0.0, 1.0))
 def test_eq_10_never_exceeds_the_desired_command(u_des, u_f, alpha):
-    assert abs(limit_channel(u_des, u_f, alpha, 0.01)) <= abs(u_des)
+    assert abs(limit_channel(u_des, u_f, alpha, 0.01, False)) <= abs(u_des)
 
 
 @given(command, command, st.floats(0.0, 1.0))
 def test_eq_10_is_odd(u_des, u_f, alpha):
-    assert limit_channel(-u_des, -u_f, alpha, 0.01) == -limit_channel(u_des, u_f, alpha, 0.01)
+    assert limit_channel(-u_des, -u_f, alpha, 0.01, False) == -limit_channel(u_des, u_f, alpha, 0.01, False)
 
 
 def test_eq_10_lines():
-    assert limit_channel(2.0, 2.0, 0.3, 0.01) == 2.0  # healthy: passed whatever alpha is
-    assert limit_channel(2.0, 0.5, 0.3, 0.01) == 0.5  # weaker than the authority allows
-    assert limit_channel(2.0, 5.0, 0.3, 0.01) == pytest.approx(0.6)  # stronger
-    assert limit_channel(2.0, -1.0, 0.3, 0.01) == pytest.approx(0.6)  # of the other sign
-    assert limit_channel(0.0, 0.3, 0.8, 0.001) == 0.0  # on a straight
+    assert limit_channel(2.0, 2.0, 0.3, 0.01, False) == 2.0  # healthy: passed whatever alpha is
+    assert limit_channel(2.0, 0.5, 0.3, 0.01, False) == 0.5  # weaker than the authority allows
+    assert limit_channel(2.0, 5.0, 0.3, 0.01, False) == pytest.approx(0.6)  # stronger
+    assert limit_channel(2.0, -1.0, 0.3, 0.01, False) == pytest.approx(0.6)  # of the other sign
+    assert limit_channel(0.0, 0.3, 0.8, 0.001, False) == 0.0  # on a straight
+
+
+def test_the_second_line_as_printed_ends_below_full_authority():
+    assert limit_channel(2.0, 0.5, 1.0, 0.01, False) == 0.5  # nothing jumps as alpha reaches 1
+    assert limit_channel(2.0, 0.5, 1.0, 0.01, True) == 2.0  # the third line
+    for alpha in (0.3, 0.999):
+        assert limit_channel(2.0, 0.5, alpha, 0.01, True) == limit_channel(2.0, 0.5, alpha, 0.01, False)
 
 
 def test_the_other_laws():

@@ -44,6 +44,16 @@ BESIDE = {
     "degradations": {"duration": 4.0, "vehicles": [], "faults": [], "randomise": []},
     "task.target_speed": {"randomise": []},
     "reward.conflict": {"authority": {"law": "none"}},
+    "task.standstill_gap": {"task": {"time_headway": 1.2}, "randomise": []},
+    "task.closing_time": {"task": {"time_headway": 1.2}, "randomise": []},
+    "authority.strict": {
+        "authority": {"law": "paper"},
+        "longitudinal_risk": {"preset": "paper"},
+        "lane_change": None,
+        "vehicles": [],
+        "faults": [{"kind": "loss_of_effectiveness", "onset": 0.0, "size": 0.5}],
+        "driver_lag": {"K_h": 0.0},
+    },
     "internal_model.K_h": {"internal_model": {"active": True}},
     "internal_model.T_h": {"internal_model": {"active": True}},
 }

@@ -287,6 +287,10 @@ def _check_idle(settings: Settings) -> None:
         _refuse_idle(
             "config['internal_model']", model, field, model.active, "the driver has no internal model (active)"
         )
+    law = settings.authority.law
+    _refuse_idle("config['authority']", settings.authority, "strict", law == "paper", f"the law is {law!r}")
+    for field in ("standstill_gap", "closing_time"):
+        keeps = settings.task.time_headway > 0.0
+        _refuse_idle("config['task']", settings.task, field, keeps, "no gap is kept without a time_headway")
     for field in ("tolerance_a", "tolerance_delta"):
-        law = settings.authority.law
         _refuse_idle("config['law_tolerances']", settings.law_tolerances, field, law == "paper", f"the law is {law!r}")

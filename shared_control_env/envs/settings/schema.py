@@ -145,6 +145,7 @@ class AuthoritySettings(Section):
 
     law: Literal[LAWS] = "paper"
     operators: Literal[OPERATORS] = "product-sum"
+    strict: bool = False  # Eq. 10's second line as printed, for alpha < 1 alone
 
 
 class InternalModelSettings(Section):
@@ -179,7 +180,7 @@ _Automation = _section("_Automation", core.PredictiveParameters)
 _Driver = _section("_Driver", core.PredictiveParameters, "R")  # the driver's cost has no potential field
 _SafeArea = _section("_SafeArea", core.SafeAreaParameters)
 _Lateral = _section("_Lateral", core.LateralRiskParameters)
-_Law = _section("_Law", core.LawParameters)
+_Law = _section("_Law", core.LawParameters, "strict")
 _Lag = _section("_Lag", core.DriverLagParameters)
 _Reward = _section("_Reward", core.RewardParameters)
 

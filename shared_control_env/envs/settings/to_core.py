@@ -33,7 +33,7 @@ def parameters_of(settings: Settings) -> core.Parameters:
         safe_area=core.SafeAreaParameters(**values(settings.safe_area)),
         lateral=core.LateralRiskParameters(**values(settings.lateral_risk)),
         longitudinal=core.LongitudinalRiskParameters(**longitudinal),
-        law=core.LawParameters(**values(settings.law_tolerances)),
+        law=core.LawParameters(**values(settings.law_tolerances), strict=settings.authority.strict),
         lag=core.DriverLagParameters(**values(settings.driver_lag)),
         internal_model=core.InternalModelParameters(
             active=settings.internal_model.active,

@@ -14,7 +14,7 @@ from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import single
 from shared_control_env.core.condensing import WORKSPACE
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import pack
+from shared_control_env.core.records import PERSON_MEMORY, SCENE, pack
 
 KEPT = 1000
 """Programs that a predictive driver remembers for its copies, 2 kB each; its solver begins anew after as many."""
@@ -195,3 +195,51 @@ class PredictiveDriver:
             verbose=False,
         )
         return solver
+
+
+class PersonDriver(PredictiveDriver):
+    """The predictive driver behind a person's eyes, attention and arm (:mod:`core.person`), as in the kernel.
+
+    Args:
+        parameters: the environment's parameters, ``parameters.person.active`` among them.
+        eps: OSQP's absolute and relative tolerance.
+
+    Attributes:
+        person: record of :data:`records.PERSON_MEMORY`: whether the person drives, what was noticed and when.
+
+    Raises:
+        ValueError: if the parameters have no person.
+    """
+
+    def __init__(self, parameters: Parameters, eps: float = 1e-5) -> None:
+        if not parameters.person.active:
+            raise ValueError("parameters.person.active = False must be True for a person to drive")
+        self.person = np.zeros((), PERSON_MEMORY)
+        self._seen = np.zeros((), SCENE)
+        super().__init__(parameters, eps)
+
+    def reset(self, seed: int | None = None) -> None:
+        """Begin an episode; what is random in the person comes from ``parameters.person.seed``."""
+        super().reset(seed)
+        self._total = np.zeros(2)
+        single.clear_person(self.person, self._parameters)
+
+    def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
+        """Desired command u_h,des of the person; see :class:`Driver`."""
+        if scene["k"] > 0:
+            self._total = np.clip(scene["felt"] + self._arm, -self._bounds, self._bounds)  # that drove the last step
+            single.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
+        self._seen[()] = scene
+        if single.take_in(scene, self._total, float(observation[-1]), self.person, self._parameters, self._seen):
+            self.solution = self.solve(self._seen)
+            self._last = self.solution.command.copy()
+            single.with_arm_noise(self._last, self.person, self._parameters)
+        else:
+            self._last = scene["felt"].copy()
+            self.solution = Solution(self._last, True, int(osqp.SolverStatus.OSQP_SOLVED), 0, 0.0, 0.0, 0.0)
+        return self._last.copy()
+
+
+def driver_of(parameters: Parameters) -> PredictiveDriver:
+    """The driver that an environment's parameters describe: a person, or the predictive driver by itself."""
+    return PersonDriver(parameters) if parameters.person.active else PredictiveDriver(parameters)

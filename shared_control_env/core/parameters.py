@@ -8,6 +8,7 @@ that the paper leaves open. All units are SI, angles in radians.
 from __future__ import annotations
 
 import math
+import statistics
 from typing import Annotated, NamedTuple
 
 from annotated_types import Interval
@@ -218,6 +219,62 @@ class InternalModelParameters(NamedTuple):
     T_h: Positive = 0.2
 
 
+class PersonParameters(NamedTuple):
+    """What is between the eye and the command of a person at the wheel (:mod:`core.person`).
+
+    Attributes:
+        active: whether the predictive driver is a person; all else acts then alone.
+        engaged: whether the person drives from the start; else the hands rest until something is noticed.
+        delay: from the road to the eye's picture of it [s]; 0.15 to 0.25 s with visual and vestibular senses in
+            steering (Nash & Cole, Vehicle System Dynamics 58(4), 2020).
+        weber: standard deviation of what is perceived over its size [-]; a Weber fraction of about 0.1 (the same).
+        noise_time: correlation time of that error, and of the arm's [s]; assumed.
+        lane_position: error of the position in the lane that is noticed [m]; assumed: the body is 0.2 m from the line.
+        heading: heading relative to the road that is noticed [rad]; assumed.
+        headway: time headway under which the vehicle ahead is noticed [s]; assumed.
+        felt_steering: steering felt at the wheel, beyond what the road's curvature asks for, that is noticed [rad];
+            assumed.
+        felt_acceleration: acceleration of the automation, beyond what the person would do, that is noticed [m/s^2];
+            assumed.
+        display: displayed authority alpha_a under which it is noticed [-]; assumed.
+        response: median time from noticing to acting [s]; log-normal over persons, see :data:`PERSONS`.
+        response_spread: standard deviation of its logarithm [-].
+        arm_noise: standard deviation of the command over its size, signal-dependent noise of the arm [-]; assumed.
+        seed: of all that is random in the person.
+    """
+
+    active: bool = False
+    engaged: bool = True
+    delay: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.2
+    weber: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.1
+    noise_time: Annotated[float, Interval(ge=0.01, le=10.0)] = 0.3
+    lane_position: Annotated[float, Interval(ge=0.01, le=5.0)] = 0.8
+    heading: Annotated[float, Interval(ge=0.001, le=0.5)] = 0.15
+    headway: Annotated[float, Interval(ge=0.0, le=5.0)] = 0.6
+    felt_steering: Annotated[float, Interval(ge=0.001, le=0.5)] = 0.08
+    felt_acceleration: Annotated[float, Interval(ge=0.01, le=10.0)] = 3.0
+    display: Fraction = 0.5
+    response: Annotated[float, Interval(ge=0.0, le=30.0)] = 1.2
+    response_spread: Annotated[float, Interval(ge=0.0, le=2.0)] = 0.5
+    arm_noise: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.05
+    seed: int = 0
+
+
+PERSONS: dict[str, PersonParameters] = {
+    "attentive": PersonParameters(active=True),
+    "hands_on": PersonParameters(active=True, engaged=False, response=1.2, response_spread=0.5),
+    "hands_off": PersonParameters(active=True, engaged=False, felt_steering=0.5, response=2.7, response_spread=0.6),
+}
+"""Persons by name.
+
+``attentive`` expects the fault and drives all the time. ``hands_on`` rests the hands on the wheel: with hands on it,
+steering reactions at a curve's system limit took 1.18 to 1.74 s (Paula et al., Sensors 23(24):9785, 2023); the median
+of 1.2 s is at the lower end, since the time here runs from the moment something passes a threshold, which is later than
+the fault; the spread is assumed. ``hands_off`` feels hardly anything at the wheel and takes 2.7 s, about the mean of
+129 studies of take-over times (Zhang et al., 2019; the number is yet to be verified); its spread is assumed.
+"""
+
+
 IDENTIFIED_DRIVERS: dict[str, DriverLagParameters] = {
     "driver_1": DriverLagParameters(0.95, 0.15),
     "driver_2": DriverLagParameters(1.15, 0.21),
@@ -249,6 +306,16 @@ class RewardParameters(NamedTuple):
     comfort: Weight = 0.05
     conflict: Weight = 0.1
     failure: Weight = 50.0
+
+
+def fitted_arms() -> tuple[tuple[float, float], tuple[float, float]]:
+    """Log-normal fit of the five drivers of Table IV: median and deviation of the logarithm, of K_h and of T_h."""
+    five = [lag for name, lag in IDENTIFIED_DRIVERS.items() if name != "average"]
+    fits = []
+    for values in zip(*five, strict=True):
+        logarithms = [math.log(value) for value in values]
+        fits.append((math.exp(statistics.mean(logarithms)), statistics.stdev(logarithms)))
+    return fits[0], fits[1]
 
 
 def critical_speed(vehicle: VehicleParameters) -> float:
@@ -385,6 +452,7 @@ class Parameters(NamedTuple):
         law: tolerances of the authority law.
         lag: the driver's response.
         internal_model: what the driver knows of it.
+        person: what is between the driver's eye and the command.
         reward: weights of the reward.
         task: lane, speed and time step.
         authority: operators, law and solver iterations.
@@ -400,6 +468,7 @@ class Parameters(NamedTuple):
     law: LawParameters = LawParameters()
     lag: DriverLagParameters = DriverLagParameters()
     internal_model: InternalModelParameters = InternalModelParameters()
+    person: PersonParameters = PersonParameters()
     reward: RewardParameters = RewardParameters()
     task: TaskParameters = TaskParameters()
     authority: AuthorityParameters = AuthorityParameters()

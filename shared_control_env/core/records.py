@@ -142,3 +142,16 @@ MEMORY = np.dtype(
     align=True,
 )
 """What the rest of the loop carries from one time step to the next."""
+
+PERSON_MEMORY = np.dtype(
+    [
+        ("past", np.float64, (MAX_DELAY, 6)),  # states of the last steps, that of step k in row k % MAX_DELAY
+        ("commands", np.float64, (MAX_DELAY, 2)),  # commands that drove the car in them
+        ("error", np.float64, (4,)),  # of perception: lateral, heading, speed; of the arm; in units of their deviation
+        ("engaged", np.bool_),  # whether the person drives; else the hands rest
+        ("noticed", np.float64),  # when something was noticed [s]; infinite before
+        ("reason", np.int64),  # what it was, index in person.REASONS
+    ],
+    align=True,
+)
+"""What a person at the wheel carries from one time step to the next."""

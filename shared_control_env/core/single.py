@@ -17,6 +17,7 @@ from shared_control_env.core import (
     fuzzy,
     info,
     observation,
+    person,
     safe_area,
 )
 from shared_control_env.core import (
@@ -233,6 +234,26 @@ def build_program(
 ) -> None:
     """:func:`driver_qp.build_program`."""
     driver_qp.build_program(scene[()], u_last, u_h_act, parameters[()], work[()], P, q, A, low, high)
+
+
+@jit
+def clear_person(memory: Record, parameters: Record) -> None:
+    """:func:`person.clear_person`."""
+    person.clear_person(memory[()], parameters[()])
+
+
+@jit
+def take_in(
+    scene: Record, u_last: np.ndarray, alpha_a: float, memory: Record, parameters: Record, seen: Record
+) -> bool:
+    """:func:`person.take_in`."""
+    return person.take_in(scene[()], u_last, alpha_a, memory[()], parameters[()], seen[()])
+
+
+@jit
+def with_arm_noise(u_h_des: np.ndarray, memory: Record, parameters: Record) -> None:
+    """:func:`person.with_arm_noise`."""
+    person.with_arm_noise(u_h_des, memory[()], parameters[()])
 
 
 @jit

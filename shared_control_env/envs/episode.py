@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from math import exp
 from typing import Any
 
 import numpy as np
 
 from shared_control_env.core.parameters import Limits
 from shared_control_env.envs.degradations import NOISES, draw_degradation
-from shared_control_env.envs.settings import RandomSettings, Settings, check, plain
+from shared_control_env.envs.settings import CUT_OFF, RandomSettings, Settings, check, plain
 
 
 def is_random(settings: Settings) -> bool:
     """Whether anything is drawn at the start of an episode."""
     noisy = any(fault.kind in NOISES and fault.seed is None for fault in settings.faults)
-    return bool(settings.randomise or settings.degradations or noisy)
+    person = settings.person.active and settings.person.seed is None
+    return bool(settings.randomise or settings.degradations or noisy or person)
 
 
 def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
-    """Settings of one episode: ``randomise`` drawn in its order, then one of ``degradations``, then seeds of noise.
+    """Settings of one episode: ``randomise`` drawn in its order, one of ``degradations``, seeds of noise and person.
 
     Args:
         settings: of the environment.
@@ -44,6 +46,8 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
             seed = int(rng.integers(2**31))  # for every kind, so that the next draws do not depend on this one's kind
             if fault["kind"] in NOISES:
                 fault["seed"] = seed
+    if config["person"]["active"] and config["person"]["seed"] is None:
+        config["person"]["seed"] = int(rng.integers(2**31))
     config["faults"] += drawn
     config["randomise"], config["degradations"] = [], []
     return check(config)
@@ -58,6 +62,10 @@ def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.
     place: Any = int(last) if isinstance(section, list) else last
     if entry.choices is not None:
         section[place] = entry.choices[int(rng.integers(len(entry.choices)))]
+        return
+    if entry.median is not None and entry.spread is not None:
+        deviation = min(max(float(rng.standard_normal()), -CUT_OFF), CUT_OFF)
+        section[place] = entry.median * exp(entry.spread * deviation)
         return
     assert entry.low is not None
     assert entry.high is not None  # as checked with the settings

@@ -22,7 +22,7 @@ from shared_control_env.controllers.scripted import (
     ScriptedDriver,
 )
 from shared_control_env.core.authority import LAWS
-from shared_control_env.core.parameters import IDENTIFIED_DRIVERS
+from shared_control_env.core.parameters import IDENTIFIED_DRIVERS, PERSONS, PersonParameters, fitted_arms
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.nearest import hint, nearest
@@ -41,12 +41,14 @@ class DriverEntry(NamedTuple):
         make: makes one for each environment; None for the paper's predictive driver, which the kernel runs.
         config: changes to the environment's settings that belong to the driver, such as the lag.
         fingerprint: tells this driver from others of the same name; None to have it made of its code and arguments.
+        draws: settings of the driver that are drawn for every episode, beside those that the scenario draws.
     """
 
     description: str
     make: Callable[[], Driver] | None = None
     config: Mapping[str, Any] = {}
     fingerprint: str | None = None
+    draws: tuple[Mapping[str, Any], ...] = ()
 
 
 class AuthorityEntry(NamedTuple):
@@ -83,6 +85,17 @@ def _lag(name: str) -> dict[str, Any]:
     return {"driver_lag": IDENTIFIED_DRIVERS[name]._asdict()}
 
 
+def _person(name: str, description: str) -> DriverEntry:
+    """A person of :data:`core.parameters.PERSONS`, whose arm is drawn around the five that the paper identified."""
+    person, default = PERSONS[name]._asdict(), PersonParameters()._asdict()
+    differing = {field: value for field, value in person.items() if value != default[field]}
+    draws = tuple(
+        {"setting": f"driver_lag.{field}", "median": median, "spread": spread}
+        for field, (median, spread) in zip(("K_h", "T_h"), fitted_arms(), strict=True)
+    )
+    return DriverEntry(description, config={"internal_model": {"active": True}, "person": differing}, draws=draws)
+
+
 DRIVERS: dict[str, DriverEntry] = {
     "mpc": DriverEntry("predictive driver, lag as in the paper's cases (K_h = 1, T_h = 0.2 s)"),
     "mpc_average": DriverEntry("predictive driver, average of the five identified lags", config=_lag("average")),
@@ -93,6 +106,11 @@ DRIVERS: dict[str, DriverEntry] = {
     "internal_model": DriverEntry(
         "predictive driver who knows its own lag and feels the automation", config={"internal_model": {"active": True}}
     ),
+    "attentive": _person(
+        "attentive", "person who drives all the time: late eyes, noise, an arm around the paper's five"
+    ),
+    "hands_on": _person("hands_on", "person with hands at rest on the wheel, who notices, and acts a while later"),
+    "hands_off": _person("hands_off", "person without hands on the wheel, who feels little and takes longer"),
     "scripted": DriverEntry("Stanley's law, speed and distance by the Intelligent Driver Model", ScriptedDriver),
     "distracted": DriverEntry("lets go until 1 s after the authority falls, then recovers", DistractedDriver),
     "over_reacting": DriverEntry("the scripted driver, 2.5 times as hard", OverreactingDriver),

@@ -20,6 +20,7 @@ from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.longitudinal_risk import PRECEDING
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
 from shared_control_env.envs.cases import CASES
+from shared_control_env.envs.settings import Settings, change, merge, plain
 from shared_control_env.envs.settings.changes import at
 from shared_control_env.envs.situation import TRAFFIC_BODY
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
@@ -86,11 +87,17 @@ def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
     for path in _paths(batch.driver[1].config):
         owners[path] = f"the driver {batch.driver[0]!r}"
     own = _joined(own, batch.driver[1].config)
+    for draw in batch.driver[1].draws:
+        owners[draw["setting"]] = f"the driver {batch.driver[0]!r}"
     if degradation is not None:
         own["degradations"] = [degradation]
         owners["degradations"] = "the suite"
     _refuse_clashes(owners, own, batch.config)
-    return _joined(own, batch.config)
+    config = _joined(own, batch.config)
+    if batch.driver[1].draws:
+        default = merge(plain(Settings()), CASES[batch.scenario].settings)
+        config["randomise"] = [*change(default, batch.config)["randomise"], *map(dict, batch.driver[1].draws)]
+    return config
 
 
 def _paths(changes: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
@@ -115,11 +122,13 @@ def _refuse_clashes(owners: Mapping[str, str], own: Mapping[str, Any], config: M
     drawn = {entry.get("setting") for entry in draws if isinstance(entry, Mapping)}
     for path, owner in owners.items():
         parts = tuple(path.split("."))
-        same = path in given and at(config, parts) == at(own, parts)
+        value = at(own, parts) if path in _paths(own) else None  # None where the driver draws it
+        same = value is not None and path in given and at(config, parts) == value
         if path in drawn or (path in given and not same):
+            what = "draws" if value is None else f"sets to {value!r}"
             raise ValueError(
-                f"config changes {path!r}, which {owner} sets to {at(own, parts)!r}; leave it out, or give an entry of "
-                "your own that has it otherwise"
+                f"config changes {path!r}, which {owner} {what}; leave it out, or give an entry of your own that has "
+                "it otherwise"
             )
 
 
@@ -178,7 +187,7 @@ class Recorder:
         self._shape = (steps, n)
         self.lengths = np.full(n, steps)
         self.crashed, self.left_road = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-        self.failures = np.zeros(n, dtype=int)
+        self.failures, self.noticed = np.zeros(n, dtype=int), np.full(n, np.nan)
         self._running = np.ones(n, dtype=bool)
 
     def note(self, k: int, infos: Mapping[str, Any], ended: np.ndarray) -> bool:
@@ -190,6 +199,10 @@ class Recorder:
             self._values[name][k] = value
         failures = infos["automation"]["failures"] + (infos["driver"]["failures"] if "driver" in infos else 0)
         self.failures[self._running] = failures[self._running]
+        if "driver" in infos:
+            noticed = infos["driver"]["noticed"]
+            seen = self._running & np.isfinite(noticed)
+            self.noticed[seen] = noticed[seen]
         over = self._running & ended
         self.lengths[over] = k + 1
         self.crashed[over], self.left_road[over] = infos["crashed"][over], ~infos["on_road"][over]
@@ -279,7 +292,8 @@ def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, 
         frames: pictures of the first episode before every step are appended, where a list is given.
 
     Returns:
-        One row an episode: what it is, how it ended, every metric, and what it was made with.
+        One row an episode: what it is, how it ended, the driver's K_h and T_h [s], when a person at rest noticed
+        something [s], every metric, and what it was made with.
     """
     begin = perf_counter()
     env = make_environment(batch, None if frames is None else "rgb_array")
@@ -307,6 +321,8 @@ def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, 
             "seed": seed,
             "terminated": bool(recorder.crashed[i] or recorder.left_road[i]),
             "duration": recorder.lengths[i] / settings.policy_frequency,
+            **plain(drawn[i])["driver_lag"],
+            "noticed": recorder.noticed[i],
             **measure_all(recorder.trajectory(i, drawn[i], wall_time)),
             "config_hash": config_hash(batch.scenario, configs[i]),
             "version": version("shared_control_env"),

@@ -56,13 +56,17 @@ def entries_of(folder: Path, driver: str, authority: str) -> tuple[DriverEntry, 
     )
     first: Any = DRIVERS.get(driver) if known[0]["origin"] == "catalogue" else None
     second: Any = AUTHORITIES.get(authority) if known[1]["origin"] == "catalogue" else None
-    first = first or DriverEntry("given by the user", _make("driver", driver, known[0]), known[0]["config"])
+    first = first or DriverEntry(
+        "given by the user", _make("driver", driver, known[0]), known[0]["config"], draws=tuple(known[0]["draws"])
+    )
     second = second or AuthorityEntry("given by the user", known[1]["law"], _make("authority", authority, known[1]))
     return first, second, manifest["config"]
 
 
 def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:
     """What makes a user's driver or allocator, imported."""
+    if described["origin"] == "settings":
+        return None
     if described["origin"] is None:
         raise ValueError(
             f"{what} {name!r} is of the program that ran the benchmark and cannot be imported; replay its episodes "

@@ -145,17 +145,25 @@ def _described(
 ) -> dict[str, Any]:
     """What a folder remembers of an entry: whether it is the same, and how it is found again.
 
-    ``origin`` is ``catalogue``, the path ``module:name`` of a class or function, or None where there is no such path.
+    ``origin`` is ``catalogue``; ``settings`` for what the kernel runs; the path ``module:name`` of a class or function;
+    or None where there is no such path.
     """
     own: dict[str, Any] = (
-        {"law": entry.law} if isinstance(entry, AuthorityEntry) else {"config": as_plain(entry.config)}
+        {"law": entry.law}
+        if isinstance(entry, AuthorityEntry)
+        else {
+            "config": as_plain(entry.config),
+            "draws": as_plain(entry.draws),
+        }
     )
     if known.get(name) is entry:
         return {"origin": "catalogue", "fingerprint": None, **own}
+    if entry.make is None:
+        return {"origin": "settings", "fingerprint": entry.fingerprint, **own}
     module, path = getattr(entry.make, "__module__", None), getattr(entry.make, "__qualname__", None)
     found = module not in (None, "__main__", "__mp_main__") and path is not None and "<" not in path
     try:
-        print_ = entry.fingerprint or (None if entry.make is None else fingerprint(entry.make))
+        print_ = entry.fingerprint or fingerprint(entry.make)
     except ValueError as error:
         raise ValueError(f"{what} {name!r}: {error}") from None
     return {"origin": f"{module}:{path}" if found else None, "fingerprint": print_, **own}

@@ -21,6 +21,7 @@ from shared_control_env.core.records import (
     AUTOMATION_MEMORY,
     FAULT_MEMORY,
     MEMORY,
+    PERSON_MEMORY,
     SCENE,
     SIGNALS,
 )
@@ -193,6 +194,7 @@ class SharedControlVectorEnv(VectorEnv):
             memories=np.zeros(n, MEMORY),
             automations=np.zeros(n, AUTOMATION_MEMORY),
             fault_memories=np.zeros((n, sizes.faults), FAULT_MEMORY),
+            persons=np.zeros(n, PERSON_MEMORY),
             crashed=np.zeros(n, dtype=bool),
             ended=np.zeros(n, dtype=bool),
         )

@@ -77,7 +77,7 @@ def decide(
     """
     p, scene, memory = batch.parameters[i], batch.scenes[i], batch.memories[i]
     if setup.driver:
-        drive(setup.solvers.drive, scene, p, memory, work, program, report)
+        drive(setup.solvers.drive, scene, p, memory, batch.persons[i], work, program, report)
     else:
         work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * p.limits.a_max
         work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * p.limits.delta_max
@@ -156,6 +156,7 @@ def restore(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
     report = out.solver[i]
     report.status, report.iterations, report.failures = 0, 0, 0
     report.primal_residual, report.dual_residual = 0.0, 0.0
+    report.engaged, report.noticed, report.reason = batch.parameters[i].person.engaged, np.inf, 0
 
 
 @jit_inlined

@@ -9,6 +9,7 @@ import numpy as np
 from shared_control_env.core import active_set_qp, condensing, delaunay, safe_area
 from shared_control_env.core.active_set_qp import MAX_ROWS, MAX_VARIABLES
 from shared_control_env.core.delaunay import MAX_TRIANGLES
+from shared_control_env.core.records import SCENE
 
 
 class Batch(NamedTuple):
@@ -24,6 +25,7 @@ class Batch(NamedTuple):
         lines: reference lines of the roads, (N, n, 6).
         faults: records of :class:`core.parameters.DegradationParameters`, (N, m).
         fault_memories: of :data:`records.FAULT_MEMORY`, (N, m).
+        persons: of :data:`records.PERSON_MEMORY`, (N,).
         traffic: other vehicles, (N, M, 8).
         plans: what they are going to do, records of :class:`core.parameters.TrafficParameters`, (N, M).
         crashed: whether the ego has collided, (N,).
@@ -39,6 +41,7 @@ class Batch(NamedTuple):
     lines: np.ndarray
     faults: np.ndarray
     fault_memories: np.ndarray
+    persons: np.ndarray
     traffic: np.ndarray
     plans: np.ndarray
     crashed: np.ndarray
@@ -125,10 +128,13 @@ SOLVER = np.dtype(
         ("primal_residual", np.float64),
         ("dual_residual", np.float64),
         ("failures", np.int64),  # steps so far at which the last command was held
+        ("engaged", np.bool_),  # whether a person drives; else the hands rest
+        ("noticed", np.float64),  # when a person at rest noticed something [s]; infinite before
+        ("reason", np.int64),  # what it was, index in person.REASONS
     ],
     align=True,
 )
-"""Report of the driver's solver, as ``info["driver"]``."""
+"""Report of the driver, as ``info["driver"]``: of its solver, and of the person."""
 
 _scratch: Any = safe_area.new_scratch
 SEARCH_SCRATCH = np.dtype(
@@ -148,6 +154,7 @@ WORKSPACE = np.dtype(
         ("plant", np.float64, (2, 6)),
         ("terms", np.float64, (7,)),  # of the reward
         ("command", np.float64, (2,)),  # the driver's
+        ("seen", SCENE, (1,)),  # the scene as a person sees it
     ],
     align=True,
 )

@@ -17,8 +17,10 @@ from numba.core.ccallback import CFunc
 from shared_control_env.core import active_set_qp, closed_loop, condensing
 from shared_control_env.core.cache import cache_of
 from shared_control_env.core.driver_qp import build_program, count_rows
+from shared_control_env.core.jit import jit_inlined
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, SCENE, Record, record_dtype
+from shared_control_env.core.person import take_in, with_arm_noise
+from shared_control_env.core.records import AUTOMATION_MEMORY, MEMORY, PERSON_MEMORY, SCENE, Record, record_dtype
 from shared_control_env.core.safe_area import Scratch, search_triangles, triangulate_compiled
 from shared_control_env.vector.intrinsics import call_of
 from shared_control_env.vector.records import PROGRAM, SOLVER, WORKSPACE, Addresses
@@ -87,19 +89,42 @@ def search(scene: Record, p: Parameters, n: int, work: Record) -> None:
     search_triangles(triangles, scene.region[0], scene.region[1], scene.z[1], p.vehicle.width, scratch, scene.area)
 
 
-def drive(scene: Record, p: Parameters, memory: Record, work: Record, program: Record, report: Record) -> None:
-    """The predictive driver's command (Eq. 15) by the active-set method, left in ``work.command``.
+def drive(
+    scene: Record, p: Parameters, memory: Record, person: Record, work: Record, program: Record, report: Record
+) -> None:
+    """The predictive driver's command (Eq. 15) by the active-set method, or a person's, left in ``work.command``.
 
-    When the solver fails the last command is held and the failure counted.
+    Hands that rest follow what they feel of the automation. When the solver fails the last command is held and the
+    failure counted.
 
     Args:
         scene: record of :data:`records.SCENE`.
         p: parameters.
         memory: record of :data:`records.MEMORY`.
+        person: record of :data:`records.PERSON_MEMORY`.
         work: record of :data:`records.WORKSPACE`.
         program: record of :data:`records.PROGRAM`.
         report: record of :data:`records.SOLVER`, written.
     """
+    if not p.person.active:
+        report.engaged, report.noticed, report.reason = True, np.inf, 0
+        _solve(scene, p, memory, work, program, report)
+        return
+    work.seen[0] = scene
+    seen = work.seen[0]
+    if take_in(scene, memory.u, memory.alpha_a, person, p, seen):
+        _solve(seen, p, memory, work, program, report)
+        with_arm_noise(work.command, person, p)
+    else:
+        work.command[0], work.command[1] = scene.felt[0], scene.felt[1]
+        report.status, report.iterations, report.failures = active_set_qp.SOLVED, 0, memory.driver_failures
+        report.primal_residual, report.dual_residual = 0.0, 0.0
+    report.engaged, report.noticed, report.reason = person.engaged, person.noticed, person.reason
+
+
+@jit_inlined
+def _solve(scene: Record, p: Parameters, memory: Record, work: Record, program: Record, report: Record) -> None:
+    """The program of a scene as the driver sees it; arguments as those of :func:`drive`."""
     g = program
     build_program(scene, memory.u_h_des, memory.u_h_act, p, work.solver, g.P, g.q, g.A, g.low, g.high)
     n, m = 2 * p.driver.H_c + 1, count_rows(p)
@@ -122,7 +147,7 @@ _P = record_dtype(Parameters)
 AUTOMATE = Solver(automate, types.Tuple((int64, int64, float64)), SCENE, _P, AUTOMATION_MEMORY, condensing.WORKSPACE)
 TRIANGULATE = Solver(triangulate, int64, SCENE, int64, WORKSPACE)
 SEARCH = Solver(search, types.void, SCENE, _P, int64, WORKSPACE)
-DRIVE = Solver(drive, types.void, SCENE, _P, MEMORY, WORKSPACE, PROGRAM, SOLVER)
+DRIVE = Solver(drive, types.void, SCENE, _P, MEMORY, PERSON_MEMORY, WORKSPACE, PROGRAM, SOLVER)
 
 
 def addresses(driver: bool) -> Addresses:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from shared_control_env.controllers.driver import Driver, PredictiveDriver, checked_command
+from shared_control_env.controllers.driver import Driver, PersonDriver, checked_command, driver_of
 from shared_control_env.envs.settings import parameters_of
 from shared_control_env.envs.slots import DRIVER
 from shared_control_env.wrappers.slots import SlotWrapper
@@ -18,11 +19,12 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
     """Binds the driver's command with any :class:`Driver`.
 
     What remains is alpha_a: the task that a learned allocator solves; nothing, with the limiter applied too.
-    A driver that reports a ``solution`` has its status, iterations, residuals and failures in ``info["driver"]``.
+    A driver that reports a ``solution`` has its status, iterations, residuals and failures in ``info["driver"]``, and a
+    person whether it drives, and what it noticed when.
 
     Args:
         env: an environment whose driver is open.
-        driver: the driver; by default the paper's predictive driver with the environment's parameters.
+        driver: the driver; by default the one of the settings: the paper's predictive driver, or a person.
 
     Raises:
         ValueError: if the driver is no object with ``reset`` and ``act``; at a step, if it gives no two finite numbers.
@@ -36,13 +38,13 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
                 f"driver = {driver!r} must be an object with reset(seed) and act(observation, scene) -> [a, delta]"
             )
         self._given = driver
-        self.driver: Driver = driver or PredictiveDriver(parameters_of(self.shared.episode))
+        self.driver: Driver = driver or driver_of(parameters_of(self.shared.episode))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset environment and driver; the driver's seed is drawn from the environment's generator."""
         observation, info = self.env.reset(seed=seed, options=options)
         if self._given is None:
-            self.driver = PredictiveDriver(parameters_of(self.shared.episode))
+            self.driver = driver_of(parameters_of(self.shared.episode))
         (own,) = self.shared.np_random.spawn(1)  # which takes nothing from the environment's own draws
         self.driver.reset(seed=int(own.integers(2**31)))
         return observation, {**info, **self._report()}
@@ -69,5 +71,12 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
                 "primal_residual": 0.0 if solution is None else solution.primal_residual,
                 "dual_residual": 0.0 if solution is None else solution.dual_residual,
                 "failures": int(getattr(self.driver, "failures", 0)),
+                **self._attention(),
             }
         }
+
+    def _attention(self) -> dict[str, Any]:
+        """Whether a person drives, and what it noticed when; of another driver, that it drives."""
+        if not isinstance(self.driver, PersonDriver):
+            return {"engaged": True, "noticed": inf, "reason": 0}
+        return {name: self.driver.person[name].item() for name in ("engaged", "noticed", "reason")}

@@ -34,6 +34,16 @@ BUSY = {
 }
 
 # What each setting needs beside it to act, and the value to try where the rule below finds none.
+RESTING = {
+    "person": {"active": True, "engaged": False, "seed": 5, "response": 0.3},
+    "internal_model": {"active": True},
+    "duration": 3.0,
+    "lane_change": None,
+    "ego": {"lateral_offset": 0.3},
+    "vehicles": [{"lane": 0, "position": 30.0, "speed": 12.0}],
+    "faults": [{"channel": "steering", "onset": 0.5, "ramp": 1.5, "size": 0.15}],
+    "randomise": [],
+}
 BESIDE = {
     "longitudinal_risk.sigma_x": {"longitudinal_risk": {"preset": "paper"}},
     "longitudinal_risk.preset": {},
@@ -54,6 +64,16 @@ BESIDE = {
         "faults": [{"kind": "loss_of_effectiveness", "onset": 0.0, "size": 0.5}],
         "driver_lag": {"K_h": 0.0},
     },
+    **{
+        f"person.{name}": {"person": {"active": True, "seed": 5}}
+        for name in ("engaged", "delay", "weber", "noise_time", "arm_noise", "seed")
+    },
+    **{
+        f"person.{name}": RESTING
+        for name in ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display")
+    },
+    "person.response": RESTING,
+    "person.response_spread": RESTING,
     "internal_model.K_h": {"internal_model": {"active": True}},
     "internal_model.T_h": {"internal_model": {"active": True}},
 }
@@ -78,6 +98,13 @@ VALUES = {
     "task.target_speed": 5.0,
     "vehicle.l_r": 1.1,
     "vehicle.C_r": 70_000.0,
+    "person.lane_position": 0.2,
+    "person.heading": 0.003,
+    "person.headway": 3.0,
+    "person.felt_steering": 0.005,
+    "person.felt_acceleration": 0.2,
+    "person.display": 0.99,
+    "person.seed": 6,
     "internal_model.K_h": 0.7,
     "internal_model.T_h": 0.3,
 }
@@ -179,7 +206,7 @@ def other_value(path, config):
 @pytest.mark.parametrize("path", [path for path in LEAVES if path.split(".")[0] not in NOT_DRAWN])
 def test_it_can_be_drawn_or_is_refused(path):
     config = configuration.merge(configuration.plain(Settings()), {**BUSY, "randomise": []})
-    config = configuration.merge(config, BESIDE.get(path, {}) if path.startswith("internal_model") else {})
+    config = configuration.merge(config, BESIDE.get(path, {}) if path.startswith(("internal_model", "person")) else {})
     present = configuration.changes.at(config, tuple(path.split(".")))
     if not is_number(VALUES.get(path, present)):
         with pytest.raises(ValueError, match=r"no number|must have"):
@@ -203,7 +230,7 @@ def is_number(value):
 
 @pytest.mark.parametrize("path", LEAVES)
 def test_assigned_to_the_config_it_counts_from_the_next_reset_on(path):
-    busy = {**BUSY, **BESIDE[path]} if path.startswith("internal_model") and path in BESIDE else BUSY
+    busy = {**BUSY, **BESIDE[path]} if path.startswith(("internal_model", "person")) and path in BESIDE else BUSY
     env = gym.make("SharedControl/TwoLane-v0", config=busy).unwrapped
     config = configuration.merge(configuration.plain(Settings()), BUSY)
     value = VALUES[path] if path in VALUES else other_value(path, config)

@@ -13,7 +13,7 @@ from shared_control_env.core import parameters as core
 from shared_control_env.core.records import MAX_DELAY
 from shared_control_env.envs.degradations import NOISES
 from shared_control_env.envs.settings.changes import at
-from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, Settings
+from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings
 from shared_control_env.nearest import hint, nearest
 
 SHARES, TIMES = ("loss_of_effectiveness", "saturation"), ("delay",)
@@ -30,6 +30,9 @@ LEAD_IN = 50.0
 
 LARGEST_OFFSET = 20.0
 """Largest offset of the perceived position [m]: several lanes."""
+
+CUT_OFF = 3.0
+"""Deviations at which log-normal draws are cut off."""
 
 NOT_DRAWN = (
     *("screen_width", "screen_height", "centering_position", "scaling"),
@@ -176,13 +179,25 @@ def _check_random(settings: Settings, config: Mapping[str, Any]) -> None:
         if isinstance(present, bool | str | list | Mapping):
             raise ValueError(f"{name}['setting'] = {entry.setting!r} is no number, so that it cannot be drawn")
         uniform = entry.low is not None and entry.high is not None and entry.low <= entry.high
-        if uniform == bool(entry.choices):
-            raise ValueError(f"{name} = {entry.model_dump()} must have either low <= high or choices")
-        for value in entry.choices or (entry.low, entry.high):
+        log_normal = entry.median is not None and entry.spread is not None
+        if [uniform, log_normal, bool(entry.choices)].count(True) != 1:
+            given = entry.model_dump(exclude_none=True)
+            raise ValueError(f"{name} = {given} must have either low <= high, or median and spread, or choices")
+        for value in ends_of(entry):
             try:
                 _validated(assigned(config, path, value))
             except ValueError as error:
                 raise ValueError(f"{name} draws a value that is not allowed: {error}") from None
+
+
+def ends_of(entry: RandomSettings) -> tuple[float, ...]:
+    """The smallest and the largest value that a draw can give, or all of its choices."""
+    if entry.choices is not None:
+        return tuple(entry.choices)
+    if entry.median is not None and entry.spread is not None:
+        factor = math.exp(CUT_OFF * entry.spread)
+        return entry.median / factor, entry.median * factor
+    return tuple(end for end in (entry.low, entry.high) if end is not None)
 
 
 def assigned(config: Any, path: tuple[str, ...], value: Any) -> Any:
@@ -287,6 +302,12 @@ def _check_idle(settings: Settings) -> None:
         _refuse_idle(
             "config['internal_model']", model, field, model.active, "the driver has no internal model (active)"
         )
+    person = settings.person
+    for field in type(person).model_fields:
+        _refuse_idle("config['person']", person, field, field == "active" or person.active, "there is no person")
+    for field in ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "response"):
+        resting = not person.engaged
+        _refuse_idle("config['person']", person, field, resting, "this person drives from the start (engaged)")
     law = settings.authority.law
     _refuse_idle("config['authority']", settings.authority, "strict", law == "paper", f"the law is {law!r}")
     for field in ("standstill_gap", "closing_time"):

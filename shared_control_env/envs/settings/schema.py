@@ -132,11 +132,13 @@ class FaultSettings(Section):
 
 
 class RandomSettings(Section):
-    """A setting drawn at the start of each episode: uniform between two ends, or one of several values."""
+    """A setting drawn at the start of each episode: uniform between two ends, log-normal, or one of several values."""
 
     setting: str  # its path, such as "ego.speed" or "vehicles.0.position"
     low: float | None = None
     high: float | None = None
+    median: Positive | None = None  # of a log-normal one, cut off at 3 deviations
+    spread: Annotated[float, Interval(ge=0.0, le=2.0)] | None = None  # standard deviation of its logarithm [-]
     choices: Annotated[list[float], MaxLen(10_000)] | None = None
 
 
@@ -183,6 +185,7 @@ _Lateral = _section("_Lateral", core.LateralRiskParameters)
 _Law = _section("_Law", core.LawParameters, "strict")
 _Lag = _section("_Lag", core.DriverLagParameters)
 _Reward = _section("_Reward", core.RewardParameters)
+_Person = _section("_Person", core.PersonParameters, "seed", seed=(Seed | None, None))  # None to have it drawn
 
 
 class Settings(Section):
@@ -218,6 +221,7 @@ class Settings(Section):
     driver: _Driver = _Driver()
     driver_lag: _Lag = _Lag()
     internal_model: InternalModelSettings = InternalModelSettings()
+    person: _Person = _Person()
     limits: _Limits = _Limits()
     vehicle: _Vehicle = _Vehicle()
     reward: _Reward = _Reward()

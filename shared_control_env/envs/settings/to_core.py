@@ -40,6 +40,7 @@ def parameters_of(settings: Settings) -> core.Parameters:
             K_h=settings.driver_lag.K_h if settings.internal_model.K_h is None else settings.internal_model.K_h,
             T_h=settings.driver_lag.T_h if settings.internal_model.T_h is None else settings.internal_model.T_h,
         ),
+        person=core.PersonParameters(**values(settings.person, seed=settings.person.seed or 0)),
         reward=core.RewardParameters(**values(settings.reward)),
         task=core.TaskParameters(
             **values(settings.task),

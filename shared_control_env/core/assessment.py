@@ -9,7 +9,7 @@ import numpy as np
 from shared_control_env.core.dynamics import PSI, V_X, R, implicit_step
 from shared_control_env.core.jit import jit_inlined
 from shared_control_env.core.lateral_risk import lateral_risk
-from shared_control_env.core.longitudinal_risk import longitudinal_risk
+from shared_control_env.core.longitudinal_risk import PRECEDING, longitudinal_risk
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.prediction import ctra
 from shared_control_env.core.records import (
@@ -86,6 +86,10 @@ def assess(scene: Record, traffic: np.ndarray, line: np.ndarray, p: Parameters, 
     """
     predict_ego(scene, signals.u_a_f, line, p, signals)
     predict_neighbours(scene, traffic, line, p.task.tau_p, signals.predicted_neighbours)
+    if p.authority.shared:  # the monitor looks through the automation's eyes
+        signals.prediction_road[1] += signals.misperception[0]
+        if signals.misperception[1] > 0.0:
+            signals.predicted_neighbours[PRECEDING, 0] = 0.0
     s, d = signals.prediction_road[0], signals.prediction_road[1]
     signals.r_y = lateral_risk(scene.area, s, d, p.lateral)
     signals.r_x = longitudinal_risk(

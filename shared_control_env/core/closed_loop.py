@@ -11,7 +11,7 @@ import numpy as np
 from shared_control_env.core import automation_mpc
 from shared_control_env.core.assessment import assess
 from shared_control_env.core.authority import apply_law
-from shared_control_env.core.degradation import degrade, misperceive
+from shared_control_env.core.degradation import ACTUATOR, PLANNER, degrade, misperceive
 from shared_control_env.core.driver_lag import advance_lag
 from shared_control_env.core.info import note_outcome
 from shared_control_env.core.jit import jit, jit_inlined
@@ -41,6 +41,7 @@ def clear_signals(signals: Record) -> None:
         signals.u_h_des,
         signals.u_h_act,
         signals.u,
+        signals.fault,
         signals.misperception,
         signals.prediction_road,
     ):
@@ -150,24 +151,42 @@ def monitor(
         p: parameters.
         signals: record of :data:`records.SIGNALS` that holds ``u_a_des``, written.
     """
-    degrade(signals.u_a_des, scene.k, p.task.dt, faults, fault_memories, p.limits, signals.u_a_f)
+    if p.authority.fault_at == ACTUATOR:
+        for i in range(2):
+            signals.u_a_f[i] = signals.u_a_des[i]
+    else:
+        degrade(signals.u_a_des, scene.k, p.task.dt, faults, fault_memories, p.limits, signals.u_a_f)
+        for i in range(2):
+            signals.fault[i] = signals.u_a_f[i] - signals.u_a_des[i]
+            if p.authority.fault_at == PLANNER:
+                signals.u_a_des[i] = signals.u_a_f[i]
     assess(scene, traffic, line, p, signals)
 
 
-@jit_inlined
-def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, scene: Record, memory: Record, signals: Record) -> None:
-    """Second half of a step: u_a,act (Eq. 10), u_h,act (Eq. 16) and ``u = clip(u_a,act + u_h,act)``.
+@jit
+def limit(alpha_a: float, p: Parameters, signals: Record) -> None:
+    """The automation's actual command u_a,act (Eq. 10), or under another law.
+
+    Args:
+        alpha_a: authority in [0, 1].
+        p: parameters.
+        signals: record of :data:`records.SIGNALS` that holds ``u_a_des`` and ``u_a_f``, written.
+    """
+    signals.alpha_a = alpha_a
+    apply_law(p.authority.law, signals.u_a_des, signals.u_a_f, alpha_a, p.law, signals.u_a_act)
+
+
+@jit
+def join(u_h_des: np.ndarray, p: Parameters, scene: Record, memory: Record, signals: Record) -> None:
+    """The driver's actual command u_h,act (Eq. 16), and ``u = clip(u_a,act + u_h,act)``.
 
     Args:
         u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
-        alpha_a: authority in [0, 1].
         p: parameters.
         scene: record of :data:`records.SCENE`; the driver will have felt u_a,act.
         memory: record of :data:`records.MEMORY`; the driver's lag advances.
         signals: record of :data:`records.SIGNALS`, completed.
     """
-    signals.alpha_a = alpha_a
-    apply_law(p.authority.law, signals.u_a_des, signals.u_a_f, alpha_a, p.law, signals.u_a_act)
     for i in range(2):
         bound = p.limits.a_max if i == 0 else p.limits.delta_max
         signals.u_h_des[i] = u_h_des[i]
@@ -175,7 +194,39 @@ def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, scene: Record, mem
         signals.u[i] = min(max(signals.u_a_act[i] + signals.u_h_act[i], -bound), bound)
         memory.u_h_des[i], memory.u[i], scene.felt[i] = u_h_des[i], signals.u[i], signals.u_a_act[i]
     advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
-    memory.alpha_a = alpha_a
+    memory.alpha_a = signals.alpha_a
+
+
+@jit_inlined
+def blend(u_h_des: np.ndarray, alpha_a: float, p: Parameters, scene: Record, memory: Record, signals: Record) -> None:
+    """Second half of a step: :func:`limit`, then :func:`join`; arguments as theirs."""
+    limit(alpha_a, p, signals)
+    join(u_h_des, p, scene, memory, signals)
+
+
+@jit_inlined
+def blend_degraded(
+    u_h_des: np.ndarray,
+    alpha_a: float,
+    p: Parameters,
+    faults: np.ndarray,
+    fault_memories: np.ndarray,
+    scene: Record,
+    memory: Record,
+    signals: Record,
+) -> None:
+    """:func:`blend` with the degradations at the actuator: on u_a,act, whatever the limiter has made of it.
+
+    Args:
+        u_h_des, alpha_a, p, scene, memory, signals: as in :func:`limit` and :func:`join`.
+        faults: records of :class:`DegradationParameters`, shape (m,).
+        fault_memories: records of :data:`records.FAULT_MEMORY`, shape (m,).
+    """
+    limit(alpha_a, p, signals)
+    sound_a, sound_delta = signals.u_a_act[0], signals.u_a_act[1]
+    degrade(signals.u_a_act, scene.k, p.task.dt, faults, fault_memories, p.limits, signals.u_a_act)
+    signals.fault[0], signals.fault[1] = signals.u_a_act[0] - sound_a, signals.u_a_act[1] - sound_delta
+    join(u_h_des, p, scene, memory, signals)
 
 
 @jit

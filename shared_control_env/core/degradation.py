@@ -20,6 +20,15 @@ from shared_control_env.core.records import MAX_DELAY, Record
 CHANNELS = ("acceleration", "steering")
 """Names of the command's channels, in the order of every command array ``[a, delta]``."""
 
+PLACES = ("planner", "command", "actuator")
+"""Where degradations of the command act; a place's index is its code.
+
+``planner``: u_a,des itself is wrong, and nobody knows what it should be. ``command``: between the automation and the
+limiter, which knows u_a,des; the paper's. ``actuator``: on u_a,act, whatever the limiter has made of it.
+"""
+
+PLANNER, COMMAND, ACTUATOR = range(3)
+
 KINDS = (
     "none",
     "bias",

@@ -35,7 +35,7 @@ INFO = np.dtype(
         ("safe_area_lower", np.float64, (MAX_CHAIN, 2)),  # boundaries of C, vertices (s, d) [m]
         ("safe_area_upper", np.float64, (MAX_CHAIN, 2)),
         ("safe_area_outcome", np.int64),  # safe_area.REACHED or BLOCKED
-        ("fault", np.float64, (2,)),  # u_a,f - u_a,des: ground truth
+        ("fault", np.float64, (2,)),  # what the degradations add to the command, u_a,f - u_a,des: ground truth
         ("misperception", np.float64, (2,)),  # automation's lane offset [m], 1 where it misses its lead: ground truth
         ("fault_active", np.bool_),  # whether any degradation has set in: ground truth
         (
@@ -77,7 +77,7 @@ def note_signals(scene: Record, signals: Record, faults: np.ndarray, failures: i
     for i in range(2):
         info.u_a_des[i], info.u_a_f[i], info.u_a_act[i] = signals.u_a_des[i], signals.u_a_f[i], signals.u_a_act[i]
         info.u_h_des[i], info.u_h_act[i], info.u[i] = signals.u_h_des[i], signals.u_h_act[i], signals.u[i]
-        info.fault[i] = signals.u_a_f[i] - signals.u_a_des[i]
+        info.fault[i] = signals.fault[i]
         info.prediction_road[i], info.misperception[i] = signals.prediction_road[i], signals.misperception[i]
     for i in range(3):
         for j in range(5):

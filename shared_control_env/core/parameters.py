@@ -430,10 +430,14 @@ class AuthorityParameters(NamedTuple):
         operators: index in :data:`core.fuzzy.OPERATORS`; ours.
         iterations: Gauss-Newton iterations of the automation per step; ours.
         first_iterations: the same at the first step, from a cold start; ours.
+        fault_at: index in :data:`core.degradation.PLACES`, where the degradations of the command act; paper: command.
+        shared: whether the monitor perceives what the automation misperceives; ours.
     """
 
     law: int = 0
     operators: int = 0
+    fault_at: int = 1
+    shared: bool = False
     iterations: int = 3
     first_iterations: int = 5
 

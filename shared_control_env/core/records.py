@@ -88,6 +88,7 @@ SIGNALS = np.dtype(
     [
         ("u_a_des", np.float64, (2,)),  # automation's desired command [m/s^2, rad]
         ("u_a_f", np.float64, (2,)),  # the same, degraded
+        ("fault", np.float64, (2,)),  # what the degradations add to the command, wherever they act
         ("misperception", np.float64, (2,)),  # of the automation: lane offset [m], 1 where it misses its lead
         ("prediction", np.float64, (6,)),  # xi = [x, y, psi, v, a, r] after tau_p, Cartesian frame
         ("prediction_road", np.float64, (2,)),  # its (s, d) [m]

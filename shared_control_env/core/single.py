@@ -175,6 +175,22 @@ def blend(
 
 
 @jit
+def blend_degraded(
+    u_h_des: np.ndarray,
+    alpha_a: float,
+    parameters: Record,
+    faults: np.ndarray,
+    fault_memories: np.ndarray,
+    scene: Record,
+    memory: Record,
+    signals: Record,
+) -> None:
+    """:func:`closed_loop.blend_degraded`."""
+    p, s, m, g = parameters[()], scene[()], memory[()], signals[()]
+    closed_loop.blend_degraded(u_h_des, alpha_a, p, faults, fault_memories, s, m, g)
+
+
+@jit
 def drive(state: np.ndarray, a: float, delta: float, dt: float, parameters: Record, work: Record) -> None:
     """:func:`dynamics.plant_step`."""
     dynamics.plant_step(state, a, delta, dt, parameters[()].vehicle, work)

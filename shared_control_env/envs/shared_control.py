@@ -184,6 +184,7 @@ class SharedControlEnv(HighwayEnv):
         settings = self.episode = draw_episode(self.settings, self.np_random)
         start = start_of(settings)
         self.line, self.faults, self.parameters = start.line, start.faults, start.parameters
+        self._fault_at_actuator = settings.fault_at == "actuator"
         self._fault_memories = np.zeros(len(self.faults), FAULT_MEMORY)
         self.scene["felt"] = 0.0
         self.command_limits = np.array(list(self.parameters["limits"][()]))
@@ -264,7 +265,11 @@ class SharedControlEnv(HighwayEnv):
         """
         command, alpha_a = self.action_type.decode(action)
         last_a, previous_s = float(self.memory["u"][0]), float(self.scene["z"][0])
-        single.blend(command, alpha_a, self.parameters, self.scene, self.memory, self.signals)
+        p, scene, memory, signals = self.parameters, self.scene, self.memory, self.signals
+        if self._fault_at_actuator:
+            single.blend_degraded(command, alpha_a, p, self.faults, self._fault_memories, scene, memory, signals)
+        else:
+            single.blend(command, alpha_a, p, scene, memory, signals)
         self.noted = self._note_signals()
         self._simulate(self.signals["u"])
         self._perceive_and_plan()

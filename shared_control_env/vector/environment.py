@@ -721,7 +721,15 @@ class Vectorised:
         self.case = case
 
     def __call__(self, num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
-        """N environments of the scenario."""
+        """N environments of the scenario.
+
+        Raises:
+            ValueError: for another automation, which the kernel does not know; or as :class:`SharedControlVectorEnv`.
+        """
+        if options.pop("automation", None) is not None:
+            raise ValueError(
+                "automation: another one is not in the kernel; use gym.make_vec(..., vectorization_mode='sync')"
+            )
         return SharedControlVectorEnv(self.case, num_envs, **options)
 
 

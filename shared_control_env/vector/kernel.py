@@ -6,6 +6,7 @@ import numpy as np
 
 from shared_control_env.core import closed_loop, fuzzy
 from shared_control_env.core.collision import overlap
+from shared_control_env.core.degradation import ACTUATOR
 from shared_control_env.core.dynamics import plant_step
 from shared_control_env.core.info import note_outcome, note_signals
 from shared_control_env.core.jit import jit, jit_inlined
@@ -120,7 +121,12 @@ def apply(
     """First half of a decision of environment i: both slots, the loop's commands, the vehicles' motion."""
     scene, signals, memory = batch.scenes[i], batch.signals[i], batch.memories[i]
     alpha_a = decide(i, commands, alphas, batch, setup, work, program, out.solver[i])
-    closed_loop.blend(work.command, alpha_a, batch.parameters[i], scene, memory, signals)
+    p = batch.parameters[i]
+    if p.authority.fault_at == ACTUATOR:
+        memories = batch.fault_memories[i]
+        closed_loop.blend_degraded(work.command, alpha_a, p, batch.faults[i], memories, scene, memory, signals)
+    else:
+        closed_loop.blend(work.command, alpha_a, p, scene, memory, signals)
     note_signals(scene, signals, batch.faults[i], batch.automations[i].failures, out.infos[i])
     simulate(i, batch, setup, work)
 

@@ -5,6 +5,7 @@ from gymnasium import spaces
 
 import shared_control_env  # noqa: F401
 from shared_control_env.controllers.allocators import FixedAuthority
+from shared_control_env.controllers.solution import Solution
 from shared_control_env.core.fuzzy import authority
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel, open_slots
@@ -112,3 +113,33 @@ def test_a_drivers_malformed_command_moves_nothing(command):
     with pytest.raises(ValueError, match=r"driver: act\(\) gave"):
         env.step(0)
     np.testing.assert_array_equal(env.unwrapped.vehicle.array, state)
+
+
+def test_the_limiter_can_be_left_out():
+    env = gym.make("SharedControl/TwoLane-v0", limiter=False)
+    assert open_slots(env) == ("driver", "authority")
+    limited = AuthorityLimiter(env)
+    plain = gym.make("SharedControl/TwoLane-v0")
+    np.testing.assert_array_equal(limited.reset(seed=0)[0], plain.reset(seed=0)[0])
+    np.testing.assert_array_equal(limited.step(np.zeros(2))[0], plain.step(np.zeros(2))[0])
+    assert open_slots(gym.make(env.spec)) == ("driver", "authority")
+    with pytest.raises(ValueError, match="limiter = 'fuzzy' must be True or False"):
+        gym.make("SharedControl/TwoLane-v0", limiter="fuzzy")
+
+
+def test_another_automation_is_made_with_the_environment():
+    class Braking:
+        def reset(self):
+            pass
+
+        def act(self, scene):
+            return Solution(np.array([-2.0, 0.0]), True, 0, 0, 0.0, 0.0, 0.0)
+
+    env = gym.make("SharedControl/TwoLane-v0", automation=Braking(), config={"faults": []})
+    for _ in range(2):
+        env.reset(seed=0)
+        np.testing.assert_array_equal(env.step(np.zeros(2))[4]["u_a_des"], [-2.0, 0.0])
+    with pytest.raises(ValueError, match=r"reset\(\) and act\(scene\)"):
+        gym.make("SharedControl/TwoLane-v0", automation=Braking)
+    with pytest.raises(ValueError, match="automation: another one is not in the kernel"):
+        gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, automation=Braking())

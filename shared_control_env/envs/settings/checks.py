@@ -309,6 +309,11 @@ def _check_idle(settings: Settings) -> None:
         resting = not person.engaged
         _refuse_idle("config['person']", person, field, resting, "this person drives from the start (engaged)")
     law = settings.authority.law
+    if settings.fault_at == "planner" and law == "paper":
+        raise ValueError(
+            "config['fault_at'] = 'planner' does not go with config['authority']['law'] = 'paper': Eq. 10 falls back "
+            "on the command without the fault, which nobody knows then; the other laws do not need it"
+        )
     _refuse_idle("config['authority']", settings.authority, "strict", law == "paper", f"the law is {law!r}")
     for field in ("standstill_gap", "closing_time"):
         keeps = settings.task.time_headway > 0.0

@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, create_model
 
 from shared_control_env.core import parameters as core
 from shared_control_env.core.authority import LAWS
-from shared_control_env.core.degradation import KINDS
+from shared_control_env.core.degradation import KINDS, PLACES
 from shared_control_env.core.fuzzy import OPERATORS
 from shared_control_env.core.parameters import Fraction, NonNegative, Positive, Speed, TargetSpeed
 from shared_control_env.envs.degradations import DEGRADATIONS
@@ -208,6 +208,8 @@ class Settings(Section):
     lane_change: LaneChangeSettings | None = None  # of the ego; None to keep the lane
     vehicles: Annotated[list[VehicleSettings], MaxLen(100)] = []
     faults: Annotated[list[FaultSettings], MaxLen(20)] = []
+    fault_at: Literal[PLACES] = "command"  # where degradations of the command act (core.degradation)
+    misperception: Literal["automation", "shared"] = "automation"  # whose: the monitor may share the automation's
     degradations: list[Literal[tuple(DEGRADATIONS)]] = []  # one of these is drawn at the start of each episode
     randomise: Annotated[list[RandomSettings], MaxLen(1000)] = []
     task: _Task = _Task()

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from shared_control_env.core import parameters as core
 from shared_control_env.core.authority import LAWS
-from shared_control_env.core.degradation import KINDS
+from shared_control_env.core.degradation import KINDS, PLACES
 from shared_control_env.core.fuzzy import OPERATORS
 from shared_control_env.core.records import pack, record_dtype
 from shared_control_env.envs.settings.schema import Settings
@@ -57,6 +57,8 @@ def parameters_of(settings: Settings) -> core.Parameters:
         authority=core.AuthorityParameters(
             law=LAWS.index(settings.authority.law),
             operators=OPERATORS.index(settings.authority.operators),
+            fault_at=PLACES.index(settings.fault_at),
+            shared=settings.misperception == "shared",
             **values(settings.solver),
         ),
     )

@@ -18,7 +18,7 @@ from shared_control_env.evaluation import AUTHORITIES, DRIVERS
 from shared_control_env.evaluation.statistics import intervals
 from shared_control_env.evaluation.storage import TABLE, write_atomically
 
-SHOWN = ("mpc", "scripted", "distracted", "over_reacting", "fighting", "none")
+SHOWN = ("mpc", "internal_model", "scripted", "attentive", "hands_on", "hands_off", "none")
 """Drivers of the README's table; the report has all of them."""
 
 RESAMPLES = 2000
@@ -71,6 +71,9 @@ def finding(table: pd.DataFrame) -> list[str]:
     for driver in [name for name in SHOWN if name in set(table["driver"])]:
         of_driver = rates.xs(driver, level="driver").sort_values()
         fewest = ", ".join(f"`{name}`" for name in of_driver.index[of_driver == of_driver.iloc[0]])
+        if of_driver.iloc[0] == of_driver.iloc[-1]:
+            lines.append(f"`{driver}`: the same under all authorities ({of_driver.iloc[0]:.1f} %)")
+            continue
         lines.append(
             f"`{driver}`: fewest failures under {fewest} ({of_driver.iloc[0]:.1f} %), most under "
             f"`{of_driver.index[-1]}` ({of_driver.iloc[-1]:.1f} %)"
@@ -80,9 +83,12 @@ def finding(table: pd.DataFrame) -> list[str]:
         ("mpc", "paper", "none"),
         ("mpc", "paper", "proportional"),
         ("mpc", "proportional", "none"),
+        ("hands_on", "paper", "none"),
+        ("hands_on", "proportional", "none"),
+        ("hands_on", "linear", "proportional"),
+        ("hands_on", "takeover", "proportional"),
+        ("hands_off", "proportional", "none"),
         ("none", "proportional", "none"),
-        ("distracted", "fixed", "proportional"),
-        ("distracted", "takeover", "proportional"),
     ):
         if {first, second} <= present and driver in set(table["driver"]):
             lines.append(compared(table, driver, first, second))

@@ -86,9 +86,9 @@ class PredictiveParameters(NamedTuple):
     The paper prints the horizons but no weights. With these the healthy automation brings a lane error of 1 m
     under 5 cm in 1.75 s with an overshoot of 0.23 m, and in Case 1 the degraded automation alone leaves
     the lane (2.4 m) while the driver holds it (0.6 m). The same values serve the driver, as the paper says.
-    The driver's loop has little to spare: a horizon of 0.5 s gives about as much lead as the lag of
-    Eq. 16 takes away, so that without the automation (law ``driver_only``) it oscillates from a lane error of 1 m
-    at all of some twenty weightings tried.
+    The paper's driver does not know the lag of Eq. 16, so that without the automation (law ``driver_only``) it
+    oscillates from a lane error of 1 m at all of some twenty weightings tried; with the lag in its model
+    (:class:`InternalModelParameters`) it does not, at the same weights and horizons.
 
     Attributes:
         H_p: prediction horizon [steps]; paper, Section VI.
@@ -220,7 +220,7 @@ class InternalModelParameters(NamedTuple):
 
 
 class PersonParameters(NamedTuple):
-    """What is between the eye and the command of a person at the wheel (:mod:`core.person`).
+    """What is between the eye and the command of a person at the wheel (:mod:`core.person`); all ours.
 
     Attributes:
         active: whether the predictive driver is a person; all else acts then alone.

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from agents.policy import LearnedAllocator, LearnedDriver, Policy
 from agents.recorded import RecordedDriver
 from shared_control_env.controllers.allocators import Allocator
 from shared_control_env.controllers.driver import Driver
-from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose
+from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
 
 T = TypeVar("T")
 
@@ -89,8 +89,9 @@ def driver_entry(source: str, trusted: bool = False) -> DriverEntry:
         )
     if path.suffix in READERS:
         make = _read("driver", path, READERS[path.suffix])
-        return DriverEntry(f"of {path.name}", make, fingerprint=_digest(path))
-    return choose("driver", source, {**DRIVERS, **dict.fromkeys(shipped("driver"))})[source]
+        return DriverEntry(f"of {path.name}", make, fingerprint=_digest(path) if path.suffix == ".zip" else None)
+    known: dict[str, Any] = {**DRIVERS, **dict.fromkeys(shipped("driver"))}
+    return choose_one("driver", source, known)
 
 
 def authority_entry(source: str) -> AuthorityEntry:
@@ -106,5 +107,6 @@ def authority_entry(source: str) -> AuthorityEntry:
     path = shipped("allocator").get(source, Path(source).expanduser())
     if path.suffix == ".npz":
         make = _read("authority", path, _allocator)
-        return AuthorityEntry(f"of {path.name}", "proportional", make, fingerprint=_digest(path))
-    return choose("authority", source, {**AUTHORITIES, **dict.fromkeys(shipped("allocator"))})[source]
+        return AuthorityEntry(f"of {path.name}", "proportional", make)
+    known: dict[str, Any] = {**AUTHORITIES, **dict.fromkeys(shipped("allocator"))}
+    return choose_one("authority", source, known)

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 try:
     import typer
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -26,11 +27,12 @@ except ImportError:
 
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
-from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose
+from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose_one
 from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
+from shared_control_env.vector.environment import settings_for_kernel
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 COLUMNS = {
@@ -130,10 +132,11 @@ def benchmark(
             )
         except OSError as error:
             bar.stop()
-            console.print(f"[red]{error}[/]: what could be written until then is in {out}; start again to go on.")
+            text = f"{error}: what could be written until then is in {out}; start again to go on."
+            console.print(text, style="red", markup=False)
             raise typer.Exit(1) from None
-    console.print(summary(table, console.width))
-    console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.")
+    console.print(summary(table, console.width), markup=False)
+    console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.", markup=False)
 
 
 def summary(table: Any, width: int = 80) -> Table | str:
@@ -150,7 +153,7 @@ def summary(table: Any, width: int = 80) -> Table | str:
     for title in COLUMNS.values():
         printed.add_column(title, justify="right", min_width=len(max(title.split(), key=len)))
     for (authority, driver), row in means.iterrows():
-        printed.add_row(authority, driver, *(f"{value:.2g}" for value in row))
+        printed.add_row(escape(authority), escape(driver), *(f"{value:.2g}" for value in row))
     return printed
 
 
@@ -172,26 +175,25 @@ def replay(
     console = Console()
     place = None if video is None else _checked_video(video)
     with _in_words(console):
-        choose("scenario", scenario, CASES)
-        choose("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
+        case = choose_one("scenario", scenario, CASES)
+        choose_one("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
         if source is None:
-            first, second = (
-                choose("driver", driver, DRIVERS)[driver],
-                choose("authority", authority, AUTHORITIES)[authority],
-            )
+            first, second = choose_one("driver", driver, DRIVERS), choose_one("authority", authority, AUTHORITIES)
             config: Any = {}
         else:
             first, second, config = entries_of(source.expanduser(), driver, authority)
         given = None if degradation == AS_GIVEN else degradation
         frames: list[Any] | None = None if video is None else []
         measured = replay_episode(scenario, (driver, first), (authority, second), given, seed, frames, config)
-    table = Table("metric", "value", "unit", title=f"{scenario}, {degradation}, {driver}, {authority}, seed {seed}")
+    title = f"{scenario}, {degradation}, {driver}, {authority}, seed {seed}"
+    table = Table("metric", "value", "unit", title=escape(title))
     for name, value in measured.items():
         table.add_row(name, f"{value:.4g}", METRICS[name].unit)
     console.print(table)
     if place is not None and frames is not None:
-        record(frames, place)
-        console.print(f"The video is {video}.")
+        frequency = settings_for_kernel(case, config).policy_frequency
+        record(frames, place, frequency)
+        console.print(f"The video is {video}.", markup=False)
 
 
 def _checked_video(path: Path) -> Path:

@@ -101,7 +101,33 @@ def test_what_a_folder_says_is_replayed(tmp_path):
     assert "'paper' is not known" in output
     code, output = run("replay", "--from", tmp_path / "nowhere", *options)
     assert code == 2
-    assert "no results of a benchmark" in output
+    assert "there is no such folder" in output
+
+
+@pytest.mark.parametrize("option", ["--scenario", "--driver", "--authority", "--degradation"])
+def test_all_is_no_episode(option):
+    chosen = {"--scenario": "curve", option: "all"}
+    code, output = run("replay", *(part for pair in chosen.items() for part in pair))
+    assert code == 2
+    assert "must be one name" in output
+
+
+def test_brackets_in_names_are_no_markup(tmp_path):
+    code, output = run(*ONE, "--out", tmp_path / "runs[bold]x[/a]")
+    assert code == 0
+    assert "runs[bold]x[/a]" in output
+
+
+def test_a_video_is_as_fast_as_the_drive(tmp_path):
+    import imageio_ffmpeg
+
+    from shared_control_env.evaluation import evaluate
+
+    evaluate("none", "none", config={"policy_frequency": 10, "duration": 2.0, "faults": []}, out=tmp_path / "run")
+    options = ("--from", tmp_path / "run", "--scenario", "two_lane", "--driver", "none", "--authority", "none")
+    assert run("replay", *options, "--video", tmp_path / "drive.mp4")[0] == 0
+    _, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "drive.mp4"))
+    assert seconds == pytest.approx(2.0, abs=0.11)
 
 
 def test_notices_are_lines(tmp_path):

@@ -7,6 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.lead import lead_of
 
 
@@ -46,10 +47,7 @@ def checked_authority(alpha_a: Any, who: str = "allocator") -> float:
     Raises:
         ValueError: if it is not one finite number.
     """
-    try:
-        array = np.asarray(alpha_a, dtype=float)
-    except (TypeError, ValueError):
-        array = np.full(0, np.nan)
+    array = as_numbers(alpha_a)
     if array.size != 1 or not np.isfinite(array).all():
         raise ValueError(f"{who}: allocate() gave {alpha_a!r}; it must give one finite number alpha_a in [0, 1]")
     return array.item()

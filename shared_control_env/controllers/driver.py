@@ -10,6 +10,7 @@ import numpy as np
 import osqp
 from scipy import sparse
 
+from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import single
 from shared_control_env.core.condensing import WORKSPACE
@@ -62,10 +63,7 @@ def checked_command(command: Any, who: str = "driver") -> np.ndarray:
     Raises:
         ValueError: if it is not two finite numbers.
     """
-    try:
-        array = np.asarray(command, dtype=float)
-    except (TypeError, ValueError):
-        array = np.full(0, np.nan)
+    array = as_numbers(command)
     if array.shape != (2,) or not all(map(isfinite, array.tolist())):
         raise ValueError(f"{who}: act() gave {command!r}; it must give finite [a, delta] [m/s^2, rad], shape (2,)")
     return array

@@ -50,7 +50,13 @@ def limit_channel(u_des: float, u_f: float, alpha: float, tolerance: float, stri
 
 @jit_inlined
 def apply_law(
-    law: int, u_des: np.ndarray, u_f: np.ndarray, alpha: float, parameters: LawParameters, u_act: np.ndarray
+    law: int,
+    u_des: np.ndarray,
+    u_f: np.ndarray,
+    alpha: float,
+    parameters: LawParameters,
+    strict: bool,
+    u_act: np.ndarray,
 ) -> None:
     """The automation's actual command under one of :data:`LAWS`.
 
@@ -62,11 +68,12 @@ def apply_law(
         u_des, u_f: desired and degraded command ``[a, delta]``, shape (2,).
         alpha: authority in [0, 1].
         parameters: tolerances of Eq. 10.
+        strict: whether its second line is as printed.
         u_act: written, shape (2,).
     """
     if law == PAPER:
-        u_act[0] = limit_channel(u_des[0], u_f[0], alpha, parameters.tolerance_a, parameters.strict)
-        u_act[1] = limit_channel(u_des[1], u_f[1], alpha, parameters.tolerance_delta, parameters.strict)
+        u_act[0] = limit_channel(u_des[0], u_f[0], alpha, parameters.tolerance_a, strict)
+        u_act[1] = limit_channel(u_des[1], u_f[1], alpha, parameters.tolerance_delta, strict)
         return
     gain = 0.0
     if law == PROPORTIONAL:

@@ -173,7 +173,8 @@ def limit(alpha_a: float, p: Parameters, signals: Record) -> None:
         signals: record of :data:`records.SIGNALS` that holds ``u_a_des`` and ``u_a_f``, written.
     """
     signals.alpha_a = alpha_a
-    apply_law(p.authority.law, signals.u_a_des, signals.u_a_f, alpha_a, p.law, signals.u_a_act)
+    choice = p.authority
+    apply_law(choice.law, signals.u_a_des, signals.u_a_f, alpha_a, p.law, choice.strict, signals.u_a_act)
 
 
 @jit
@@ -232,7 +233,7 @@ def blend_degraded(
 @jit
 def is_on_road(scene: Record, p: Parameters) -> bool:
     """Whether the ego's centre is between the road's edges."""
-    return p.task.road_low <= scene.z[1] <= p.task.road_high
+    return -0.5 * p.task.lane_width <= scene.z[1] <= p.task.road_high
 
 
 @jit_inlined

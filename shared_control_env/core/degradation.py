@@ -146,7 +146,7 @@ def degrade_channel(
     if kind == LOSS_OF_EFFECTIVENESS:
         return (1.0 - g * size) * u
     if kind == STUCK:
-        return memory.held[channel]
+        return memory.kept[channel]
     if kind == RATE_LIMIT:
         return min(max(u, memory.last[channel] - size * dt), memory.last[channel] + size * dt)
     if kind == SATURATION:
@@ -157,7 +157,7 @@ def degrade_channel(
     if kind == WHITE_NOISE:
         return u + g * size * standard_normal(fault.seed, 2 * k + channel)
     if kind == COLOURED_NOISE:
-        return u + g * size * memory.noise[channel]
+        return u + g * size * memory.kept[channel]
     if kind == OSCILLATION:
         return u + g * size * sin(2.0 * pi * fault.frequency * elapsed)
     if kind == DROP_OUT:
@@ -173,13 +173,13 @@ def _remember(fault: DegradationParameters, memory: Record, u: np.ndarray, actin
     phi = exp(-dt / fault.time_constant)
     for channel in range(2):
         memory.past[k % MAX_DELAY, channel] = u[channel]
-        if acting and not memory.acting:
-            memory.held[channel] = u[channel]
+        if fault.kind == STUCK and acting and not memory.acting:
+            memory.kept[channel] = u[channel]
         if not acting:
             memory.last[channel] = u[channel]
         if fault.kind == COLOURED_NOISE:
             n = standard_normal(fault.seed, 2 * k + channel)
-            memory.noise[channel] = n if k == 0 else phi * memory.noise[channel] + sqrt(1.0 - phi * phi) * n
+            memory.kept[channel] = n if k == 0 else phi * memory.kept[channel] + sqrt(1.0 - phi * phi) * n
     memory.acting = acting
 
 

@@ -164,7 +164,6 @@ class LongitudinalRiskParameters(NamedTuple):
     alpha: Positive = 10.0
     A_f: Positive = 2.0
     sigma_x: Positive = 4.0
-    graded: bool = True
     b: Positive = 2.0
     a_max: Positive = 7.0
     t_r: NonNegative = 0.1
@@ -176,6 +175,7 @@ class LongitudinalRiskParameters(NamedTuple):
     w_f_change: Fraction = 0.8
     w_l_change: Fraction = 0.1
     w_p_change: Fraction = 0.1
+    graded: bool = True
     bumper_to_bumper: bool = False
 
 
@@ -185,12 +185,10 @@ class LawParameters(NamedTuple):
     Attributes:
         tolerance_a: |a_f - a_des| still counted as equal [m/s^2].
         tolerance_delta: |delta_f - delta_des| still counted as equal [rad].
-        strict: whether the second line holds with full authority too; printed is alpha < 1.
     """
 
     tolerance_a: NonNegative = 0.01
     tolerance_delta: NonNegative = 0.001
-    strict: bool = False
 
 
 class DriverLagParameters(NamedTuple):
@@ -259,6 +257,9 @@ class PersonParameters(NamedTuple):
     arm_noise: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.05
     seed: int = 0
 
+
+TRAFFIC_BODY = (5.0, 2.0)
+"""Length and width of highway-env's vehicles [m]."""
 
 PERSONS: dict[str, PersonParameters] = {
     "attentive": PersonParameters(active=True),
@@ -338,7 +339,6 @@ class TaskParameters(NamedTuple):
         dt: time step of all controllers [s]; paper, Section VI (0.05 s).
         tau_p: horizon of the CTRA prediction [s]; paper, Section III-A.
         lane_width: width of a lane [m]; spec of the cases (4 m).
-        road_low: right edge of the road in the road frame [m].
         road_high: left edge of the road in the road frame [m].
         road_end: path length at which the road ends, and with it the episode [m].
         y_target: lateral position of the lane to keep [m].
@@ -355,7 +355,6 @@ class TaskParameters(NamedTuple):
     dt: Positive = 0.05
     tau_p: Annotated[float, Interval(ge=1e-3, le=10.0)] = 0.5
     lane_width: Positive = 4.0
-    road_low: float = -2.0
     road_high: float = 6.0
     road_end: Positive = math.inf
     y_target: float = 0.0
@@ -432,12 +431,14 @@ class AuthorityParameters(NamedTuple):
         first_iterations: the same at the first step, from a cold start; ours.
         fault_at: index in :data:`core.degradation.PLACES`, where the degradations of the command act; paper: command.
         shared: whether the monitor perceives what the automation misperceives; ours.
+        strict: whether the second line of Eq. 10 holds for alpha < 1 alone, as printed.
     """
 
     law: int = 0
     operators: int = 0
     fault_at: int = 1
     shared: bool = False
+    strict: bool = False
     iterations: int = 3
     first_iterations: int = 5
 

@@ -15,7 +15,7 @@ from shared_control_env.core.dynamics import PSI, V_X, Y, implicit_step
 from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.longitudinal_risk import PRECEDING
 from shared_control_env.core.noise import standard_normal
-from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.parameters import TRAFFIC_BODY, Parameters
 from shared_control_env.core.records import MAX_DELAY, NEAR_S, PRESENT, Record
 
 REASONS = ("nothing", "lane position", "heading", "headway", "felt steering", "felt acceleration", "display")
@@ -108,7 +108,7 @@ def what_is_noticed(seen: Record, alpha_a: float, p: Parameters) -> int:
     if abs(z[PSI]) > person.heading:
         return HEADING
     preceding = seen.neighbours[PRECEDING]
-    gap = preceding[NEAR_S] - z[0] - p.vehicle.length
+    gap = preceding[NEAR_S] - z[0] - 0.5 * (p.vehicle.length + TRAFFIC_BODY[0])
     if preceding[PRESENT] > 0.0 and gap < person.headway * z[V_X]:
         return HEADWAY
     wheelbase = p.vehicle.l_f + p.vehicle.l_r

@@ -100,8 +100,8 @@ SIGNALS = np.dtype(
         ("u_h_des", np.float64, (2,)),  # driver's desired command
         ("u_h_act", np.float64, (2,)),  # driver's actual command
         ("u", np.float64, (2,)),  # command that drives the vehicle
-        ("status", np.int64),  # automation_mpc.CONVERGED, ITERATION_LIMIT or FAILED
-        ("iterations", np.int64),  # Gauss-Newton iterations
+        ("status", np.int32),  # automation_mpc.CONVERGED, ITERATION_LIMIT or FAILED
+        ("iterations", np.int32),  # Gauss-Newton iterations
         ("residual", np.float64),  # projected gradient
     ],
     align=True,
@@ -111,9 +111,8 @@ SIGNALS = np.dtype(
 FAULT_MEMORY = np.dtype(
     [
         ("acting", np.bool_),  # whether it acted in the step before
-        ("held", np.float64, (2,)),  # command at the moment it set in
+        ("kept", np.float64, (2,)),  # command at the moment it set in, of a stuck one; state of coloured noise
         ("last", np.float64, (2,)),  # its last output
-        ("noise", np.float64, (2,)),  # state of coloured noise
         ("past", np.float64, (MAX_DELAY, 2)),  # commands of the last steps, step k in row k % MAX_DELAY
     ],
     align=True,
@@ -137,8 +136,8 @@ MEMORY = np.dtype(
         ("u", np.float64, (2,)),  # last command of the vehicle
         ("alpha_a", np.float64),  # authority last displayed
         ("in_lane", np.bool_),  # whether the ego's centre is in the lane to keep
-        ("lane_departures", np.int64),  # times that it has left the lane
-        ("driver_failures", np.int64),  # steps at which the vectorised driver's solver failed
+        ("lane_departures", np.int32),  # times that it has left the lane
+        ("driver_failures", np.int32),  # steps at which the vectorised driver's solver failed
     ],
     align=True,
 )

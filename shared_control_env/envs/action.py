@@ -23,7 +23,7 @@ class SlotAction(ActionType):
 
     def __init__(self, env: SharedControlEnv) -> None:
         super().__init__(env)
-        self._clipping = Clipping()
+        self.clipping = Clipping()
 
     def space(self) -> spaces.Space:
         """Dict with a Box for each slot."""
@@ -51,6 +51,6 @@ class SlotAction(ActionType):
                 f"action = {action!r} must be a dict with the keys {sorted(SLOT_SPACES)}; the wrappers "
                 "AuthorityLimiter and DriverModel bind one each"
             )
-        command = checked_slot(DRIVER, action[DRIVER], self._clipping)
+        command = checked_slot(DRIVER, action[DRIVER], self.clipping)
         command *= self.env.command_limits
-        return command, float(checked_slot(AUTHORITY, action[AUTHORITY], self._clipping)[0])
+        return command, float(checked_slot(AUTHORITY, action[AUTHORITY], self.clipping)[0])

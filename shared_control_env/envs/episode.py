@@ -20,7 +20,10 @@ def is_random(settings: Settings) -> bool:
 
 
 def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
-    """Settings of one episode: ``randomise`` drawn in its order, one of ``degradations``, seeds of noise and person.
+    """Settings of one episode: ``randomise`` drawn in its order, one of ``degradations``, seeds of noise, who drives.
+
+    Where a person drives, what concerns the driver is drawn from a generator of its own, so that a seed gives the same
+    road, traffic and degradations whoever drives.
 
     Args:
         settings: of the environment.
@@ -35,8 +38,9 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
     if not is_random(settings):
         return settings
     config = plain(settings)
+    own = rng.spawn(1)[0] if settings.has_person else rng
     for entry in settings.randomise:
-        _draw_setting(config, entry, rng)
+        _draw_setting(config, entry, own if _concerns_driver(entry) else rng)
     drawn: list[dict[str, Any]] = []
     if settings.degradations:
         name = settings.degradations[int(rng.integers(len(settings.degradations)))]
@@ -46,11 +50,15 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
             seed = int(rng.integers(2**31))  # for every kind, so that the next draws do not depend on this one's kind
             if fault["kind"] in NOISES:
                 fault["seed"] = seed
-    if config["person"]["active"] and config["person"]["seed"] is None:
-        config["person"]["seed"] = int(rng.integers(2**31))
+    if settings.has_person and settings.person.seed is None:
+        config["person"]["seed"] = int(own.integers(2**31))
     config["faults"] += drawn
     config["randomise"], config["degradations"] = [], []
     return check(config)
+
+
+def _concerns_driver(entry: RandomSettings) -> bool:
+    return entry.setting.split(".")[0] in ("driver", "driver_lag", "internal_model", "person")
 
 
 def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.Generator) -> None:
@@ -60,7 +68,7 @@ def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.
     for key in path:
         section = section[int(key)] if isinstance(section, list) else section[key]
     place: Any = int(last) if isinstance(section, list) else last
-    if entry.choices is not None:
+    if entry.choices:
         section[place] = entry.choices[int(rng.integers(len(entry.choices)))]
         return
     if entry.median is not None and entry.spread is not None:

@@ -8,7 +8,7 @@ from highway_env.envs.common.abstract import AbstractEnv
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
 
-from shared_control_env.envs.vehicles import EgoVehicle
+from shared_control_env.envs.vehicles import EgoVehicle, LaneFollower
 
 
 class HighwayEnv(AbstractEnv):
@@ -73,6 +73,11 @@ class HighwayEnv(AbstractEnv):
     def set_vehicle_field(self, args: tuple[str, object]) -> AbstractEnv:
         """A copy in which a field of the other vehicles is set; refused where they have no such field."""
         self._require_attribute("set_vehicle_field", args[0])
+        own = any(isinstance(vehicle, LaneFollower) for vehicle in self.road.vehicles)
+        if own and args[0] not in ("position", "heading", "speed"):
+            raise ValueError(
+                f"set_vehicle_field(): {args[0]!r} of this traffic would not act; position, heading and speed do"
+            )
         return super().set_vehicle_field(args)
 
     def call_vehicle_method(self, args: tuple[str, tuple[object]]) -> AbstractEnv:

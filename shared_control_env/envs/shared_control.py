@@ -10,6 +10,8 @@ import numpy as np
 from highway_env.vehicle.graphics import VehicleGraphics
 
 from shared_control_env.controllers.automation import Automation, Planner
+from shared_control_env.controllers.driver import checked_command
+from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import delaunay, single
 from shared_control_env.core.info import INFO, as_dict
 from shared_control_env.core.records import FAULT_MEMORY, HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
@@ -73,6 +75,7 @@ class SharedControlEnv(HighwayEnv):
         self._triangulation = np.zeros((), delaunay.WORKSPACE)
         self._given_automation: Planner | None = None
         self._adopted: dict[str, Any] | None = None
+        self._spec: Any = None
         super().__init__(config=config, render_mode=render_mode)
 
     @classmethod
@@ -91,7 +94,7 @@ class SharedControlEnv(HighwayEnv):
         adopted = self.config if self._adopted is None else self._adopted
         assigned = configuration.difference(adopted, self.config)
         merged = configuration.change(adopted, assigned) if assigned else adopted
-        merged = configuration.change(merged, config or {})
+        merged = configuration.change(merged, {} if config is None else config)
         if merged["offscreen_rendering"] is None:
             merged["offscreen_rendering"] = self.render_mode != "human"
         settings = configuration.check(merged)
@@ -164,6 +167,7 @@ class SharedControlEnv(HighwayEnv):
         if changes is not None or self.config != self._adopted:
             self.configure(changes)
         gym.Env.reset(self, seed=checked_seed(seed))
+        self.action_type.clipping.clear()
         self.update_metadata()
         self.steps, self.time, self.done = 0, 0.0, False
         self._reset()
@@ -201,7 +205,8 @@ class SharedControlEnv(HighwayEnv):
         self._terms = np.zeros(len(TERMS))
         self.episode_steps = settings.steps
         self._path = np.zeros((settings.steps + 1, 2))
-        self._automation = self._given_automation or Automation(self.parameters)
+        given = self._given_automation
+        self._automation = Automation(self.parameters) if given is None else given
         self._automation.reset()
         single.clear_memory(self.memory)
         single.clear_signals(self.signals)
@@ -241,15 +246,11 @@ class SharedControlEnv(HighwayEnv):
 
     def _desired(self) -> np.ndarray:
         """The automation's command; one of another automation is checked, and kept within the limits."""
-        command = self.solution.command
         if self._given_automation is None:
-            return command
-        command = np.asarray(command, dtype=float)
-        if command.shape != (2,) or not np.isfinite(command).all():
-            raise ValueError(
-                f"automation.act() gave the command {command!r}; it must be finite [a, delta] [m/s^2, rad], shape (2,)"
-            )
-        return np.clip(command, -self.command_limits, self.command_limits)
+            return self.solution.command
+        if not isinstance(self.solution, Solution):
+            raise ValueError(f"automation.act() gave {self.solution!r}, which is no controllers.solution.Solution")
+        return np.clip(checked_command(self.solution.command, "automation"), -self.command_limits, self.command_limits)
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Drive one time step.
@@ -394,6 +395,17 @@ class SharedControlEnv(HighwayEnv):
                 self.viewer.handle_events()
             return None
         return self.viewer.get_image()
+
+    @property
+    def spec(self) -> Any:
+        """Gymnasium's specification, with the settings in plain types, so that it can be written as JSON."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: Any) -> None:
+        if spec is not None and isinstance(spec.kwargs.get("config"), Mapping):
+            spec.kwargs = {**spec.kwargs, "config": configuration.as_plain(spec.kwargs["config"])}
+        self._spec = spec
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickles: all but windows and recorders, which belong to this process."""

@@ -6,13 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shared_control_env.core.parameters import TRAFFIC_BODY
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, SPEED, pack
 from shared_control_env.core.road import curvature_at, point_at, reference_line
 from shared_control_env.core.traffic import follow_lane
 from shared_control_env.envs.settings import LEAD_IN, Settings, fault_records, parameters_of, plan_records
-
-TRAFFIC_BODY = (5.0, 2.0)
-"""Length and width of highway-env's vehicles [m]."""
 
 
 class Situation(NamedTuple):

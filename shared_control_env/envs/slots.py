@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from gymnasium import logger, spaces
 
+from shared_control_env.controllers.arrays import as_array
+
 DRIVER, AUTHORITY = "driver", "authority"
 """Names of the slots."""
 
@@ -30,6 +32,10 @@ def space_of(slots: tuple[str, ...]) -> spaces.Space:
     return spaces.Dict(boxes) if len(boxes) > 1 else boxes[slots[0]]
 
 
+SLACK = 1e-3
+"""How far a value may be beyond its bounds by rounding."""
+
+
 class Clipping:
     """Warns once of values that are beyond their bounds step after step, since they are in another unit, perhaps.
 
@@ -48,6 +54,12 @@ class Clipping:
         self.in_a_row = dict.fromkeys(SLOT_SPACES, False)
         self._told = False
 
+    def clear(self, ended: Any = slice(None)) -> None:
+        """Forget the steps so far, of the environments whose episodes have ended."""
+        for slot, steps in self._steps.items():
+            if self.in_a_row[slot]:
+                steps[ended] = 0
+
     def note(self, slot: str, values: np.ndarray, beyond: bool) -> None:
         """Note the values of one step.
 
@@ -64,7 +76,7 @@ class Clipping:
         low, high, _ = _BOUNDS[slot]
         steps = self._steps[slot]
         steps += 1
-        steps[((values >= low) & (values <= high)).all(axis=1)] = 0
+        steps[((values >= low - SLACK) & (values <= high + SLACK)).all(axis=1)] = 0
         self.in_a_row[slot] = True
         if not self._told and steps.max() >= self.PATIENCE:
             self._told = True
@@ -73,11 +85,6 @@ class Clipping:
                 "Actions are shares of the limits, as action_space says; a command in m/s^2 and rad becomes one by "
                 "env.unwrapped.action_of(command), or drives through wrappers.DriverModel."
             )
-
-
-def as_array(value: Any) -> Any:
-    """A tensor of PyTorch as an array of NumPy, which NumPy by itself warns of; anything else as it is."""
-    return value.detach().cpu().numpy() if hasattr(value, "detach") else value
 
 
 def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
@@ -101,7 +108,7 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
         raise ValueError(
             f"action[{slot!r}] = {value!r} must be {size} finite number(s) in [{low:g}, {high:g}], shape ({size},)"
         )
-    beyond = min(values) < low or max(values) > high
+    beyond = min(values) < low - SLACK or max(values) > high + SLACK
     if beyond or clipping.in_a_row[slot]:
         clipping.note(slot, array[None], beyond)
     return array.clip(low, high, out=array)

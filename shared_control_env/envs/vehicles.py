@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -153,8 +152,11 @@ def vehicle_class(path: str) -> type[Vehicle]:
     """
     module, _, name = path.rpartition(".")
     what = f"config['other_vehicles_type'] = {path!r}"
-    if module.split(".")[0] in ("highway_env", "shared_control_env") and find_spec(module) is not None:
-        found = getattr(import_module(module), name, None)
+    if module.split(".")[0] in ("highway_env", "shared_control_env"):
+        try:
+            found = getattr(import_module(module), name, None)
+        except ImportError as error:
+            raise ValueError(f"{what} is not the path of a class: {error}") from None
     elif module in sys.modules:
         found = getattr(sys.modules[module], name, None)
     else:
@@ -162,7 +164,8 @@ def vehicle_class(path: str) -> type[Vehicle]:
             f"{what} must be the path of a class, such as {OWN_TRAFFIC!r}; its module {module!r} is neither "
             "highway-env's nor imported already"
         )
-    if not isinstance(found, type) or not issubclass(found, Vehicle):
+    unfit = found in (ArrayVehicle, EgoVehicle)
+    if not isinstance(found, type) or not issubclass(found, Vehicle) or unfit:
         raise ValueError(f"{what} must be the path of a class of vehicles, such as {OWN_TRAFFIC!r}; it is {found!r}")
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias, TypeVar
@@ -25,6 +26,7 @@ from shared_control_env.core.authority import LAWS
 from shared_control_env.core.parameters import IDENTIFIED_DRIVERS, PERSONS, PersonParameters, fitted_arms
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.envs.settings import as_plain
 from shared_control_env.nearest import hint, nearest
 
 T = TypeVar("T")
@@ -150,24 +152,32 @@ def choose(what: str, given: str | Iterable[str] | Mapping[str, Any], known: Map
     Raises:
         ValueError: for an unknown name, listing the valid ones and the nearest; for none at all, or what is no name.
     """
-    if isinstance(given, Mapping):
-        entries = dict(given)
-    elif given == "all":
+    if isinstance(given, str) and given == "all":
         return dict(known)
-    else:
-        if not isinstance(given, Iterable):
-            raise ValueError(f"{what} = {given!r} must be a name, several, or a mapping of names to what makes one")
-        entries = dict.fromkeys([given] if isinstance(given, str) else given)
-    if not entries:
+    if not isinstance(given, Iterable):
+        raise ValueError(f"{what} = {given!r} must be a name, several, or a mapping of names to what makes one")
+    names = [given] if isinstance(given, str) else list(given)
+    if not names:
         raise ValueError(f"{what} = {given!r} names nothing; valid are {', '.join(known)}")
-    for name in entries:
-        if not isinstance(name, str) or not name:
+    for name in names:
+        if not isinstance(name, str) or not name or not _is_text(name):
             raise ValueError(f"{what} = {name!r} must be a name, which is a text that is not empty")
         if not isinstance(given, Mapping) and name not in known:
             near = nearest(name, known)
             suggestion = f"did you mean {near!r}? " if near else ""
             raise ValueError(f"{what} = {name!r} is not known; {suggestion}valid are {', '.join(known)}")
-    return entries if isinstance(given, Mapping) else {name: known[name] for name in entries}
+    return dict(given) if isinstance(given, Mapping) else {name: known[name] for name in names}
+
+
+def choose_one(what: str, name: Any, known: Mapping[str, T]) -> T:
+    """The entry of one name.
+
+    Raises:
+        ValueError: if it is not known, with the nearest.
+    """
+    if not isinstance(name, str) or name == "all":
+        raise ValueError(f"{what} = {name!r} must be one name; valid are {', '.join(known)}")
+    return next(iter(choose(what, name, known).values()))
 
 
 def chosen_drivers(given: Drivers) -> dict[str, DriverEntry]:
@@ -178,11 +188,18 @@ def chosen_drivers(given: Drivers) -> dict[str, DriverEntry]:
     """
     entries = {}
     for name, entry in choose("driver", given, DRIVERS).items():
-        made = entry if isinstance(entry, DriverEntry) else DriverEntry("given by the user", entry)
-        if not isinstance(made.config, Mapping):
-            raise ValueError(f"driver {name!r} has config = {made.config!r}, which must be a dict")
+        made = (
+            entry if isinstance(entry, DriverEntry) else DriverEntry("given by the user", _given("driver", name, entry))
+        )
+        if not isinstance(made.config, Mapping) or "randomise" in made.config:
+            raise ValueError(
+                f"driver {name!r} has config = {made.config!r}; it must be a dict, and what is drawn in draws"
+            )
+        draws = made.draws if isinstance(made.draws, list | tuple) else (None,)
+        if not all(isinstance(draw, Mapping) and isinstance(draw.get("setting"), str) for draw in draws):
+            raise ValueError(f"driver {name!r} has draws = {made.draws!r}, which must be dicts with a 'setting' each")
         _check_maker("driver", name, made.make, Driver, "reset(seed) and act(observation, scene)")
-        entries[name] = made
+        entries[name] = made._replace(config=as_plain(made.config), draws=tuple(as_plain(draws)))
     return entries
 
 
@@ -204,6 +221,22 @@ def chosen_authorities(given: Authorities) -> dict[str, AuthorityEntry]:
     return entries
 
 
+def _is_text(name: str) -> bool:
+    """Whether a name can be written: no half of a character."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _given(what: str, name: str, make: Any) -> Any:
+    """What a user gives for a name by itself, which is something."""
+    if make is None:
+        raise ValueError(f"{what} {name!r} is None; it must be what makes one for each episode, such as its class")
+    return make
+
+
 def _check_maker(what: str, name: str, make: Any, kind: Any, methods: str) -> None:
     """Raise ValueError unless calling ``make`` gives an object of a kind."""
     if make is None:
@@ -212,9 +245,16 @@ def _check_maker(what: str, name: str, make: Any, kind: Any, methods: str) -> No
         raise ValueError(
             f"{what} {name!r} is {make!r}; it must be what makes one for each episode, such as a class, not one itself"
         )
-    made = make()
+    try:
+        made = make()
+    except Exception as error:
+        raise ValueError(f"{what} {name!r}: {make!r}() gave an error, {type(error).__name__}: {error}") from error
     if isinstance(made, type) or not isinstance(made, kind):
         raise ValueError(f"{what} {name!r}: {make!r} makes {made!r}, which is no object with {methods}")
+    try:
+        inspect.signature(made.reset).bind(seed=0)
+    except TypeError:
+        raise ValueError(f"{what} {name!r}: its reset must take a seed, as in reset(self, seed=None)") from None
 
 
 def chosen_suite(suite: str | Suite) -> Suite:
@@ -224,11 +264,13 @@ def chosen_suite(suite: str | Suite) -> Suite:
         ValueError: for an unknown suite, scenario or degradation, with the nearest, or an empty suite.
     """
     if not isinstance(suite, Suite):
-        return next(iter(choose("suite", suite, SUITES).values()))
+        return choose_one("suite", suite, SUITES)
+    for part in (suite.scenarios, suite.degradations):
+        if not isinstance(part, list | tuple) or not part:
+            raise ValueError(f"the suite's {part!r} must be a tuple of names, not empty; degradations may hold None")
     choose("scenario", suite.scenarios, CASES)
-    if not isinstance(suite.degradations, Iterable) or isinstance(suite.degradations, str) or not suite.degradations:
-        raise ValueError(f"degradations = {suite.degradations!r} of the suite must be several names, or None")
     named = [name for name in suite.degradations if name is not None]
     if named:
         choose("degradation", named, DEGRADATIONS)
-    return suite
+    unique: Any = dict.fromkeys
+    return suite._replace(scenarios=tuple(unique(suite.scenarios)), degradations=tuple(unique(suite.degradations)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -37,6 +38,14 @@ def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows
     Raises:
         WorkersLostError: if a process was killed, or could not begin.
     """
+    for batch in batches:
+        try:
+            pickle.dumps((batch.driver, batch.authority))
+        except Exception as error:
+            raise WorkersLostError(
+                f"jobs = {jobs}: driver {batch.driver[0]!r} or authority {batch.authority[0]!r} cannot be sent to "
+                f"another process ({error}); define it in a file, under a name, or use jobs=1"
+            ) from None
     first: dict[bool, Batch] = {}
     for batch in batches:
         first.setdefault(batch.driver[1].make is None, batch)

@@ -21,7 +21,6 @@ from shared_control_env.core.longitudinal_risk import PRECEDING
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
 from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.settings import Settings, change, merge, plain
-from shared_control_env.envs.settings.changes import at
 from shared_control_env.envs.situation import TRAFFIC_BODY
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
 from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
@@ -81,55 +80,59 @@ def plan(
 
 
 def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
-    """Changes to the scenario's settings for one episode of a batch."""
-    own: dict[str, Any] = {"authority": {"law": batch.authority[1].law}}
-    owners = {"authority.law": f"the authority {batch.authority[0]!r}"}
-    for path in _paths(batch.driver[1].config):
-        owners[path] = f"the driver {batch.driver[0]!r}"
-    own = _joined(own, batch.driver[1].config)
-    for draw in batch.driver[1].draws:
-        owners[draw["setting"]] = f"the driver {batch.driver[0]!r}"
+    """Changes to the scenario's settings for one episode of a batch.
+
+    Raises:
+        ValueError: if two of authority, suite, driver and the user's config say different things of one setting.
+    """
+    driver, entry = f"the driver {batch.driver[0]!r}", batch.driver[1]
+    parts: list[tuple[str, Mapping[str, Any]]] = [
+        (f"the authority {batch.authority[0]!r}", {"authority": {"law": batch.authority[1].law}}),
+        (driver, entry.config),
+        ("config", batch.config),
+    ]
     if degradation is not None:
-        own["degradations"] = [degradation]
-        owners["degradations"] = "the suite"
-    _refuse_clashes(owners, own, batch.config)
-    config = _joined(own, batch.config)
-    if batch.driver[1].draws:
+        parts.insert(1, ("the suite", {"degradations": [degradation]}))
+    config: dict[str, Any] = {}
+    owners: dict[str, tuple[str, Any]] = {}
+    for owner, changes in parts:
+        for path, value in _leaves(changes):
+            _refuse_clash(owners, owner, path, value)
+            owners[path] = owner, value
+        if owner == driver:
+            owners.update({draw["setting"]: (driver, DRAWN) for draw in entry.draws})
+        config = _joined(config, changes)
+    given = batch.config.get("randomise")
+    for draw in given if isinstance(given, list) else ():
+        if isinstance(draw, Mapping) and isinstance(draw.get("setting"), str):
+            _refuse_clash({k: v for k, v in owners.items() if v[0] != "config"}, "config", draw["setting"], DRAWN)
+    if entry.draws:
         default = merge(plain(Settings()), CASES[batch.scenario].settings)
-        config["randomise"] = [*change(default, batch.config)["randomise"], *map(dict, batch.driver[1].draws)]
+        config["randomise"] = [*change(default, batch.config)["randomise"], *entry.draws]
     return config
 
 
-def _paths(changes: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
-    """Paths of the settings that nested changes name, such as ``driver_lag.K_h``."""
+DRAWN = "a draw"
+"""Stands for the value of a setting that is drawn."""
+
+
+def _leaves(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Paths of the settings that nested changes name, such as ``driver_lag.K_h``, and their values."""
     for key, value in changes.items():
         if isinstance(value, Mapping):
-            yield from _paths(value, f"{prefix}{key}.")
+            yield from _leaves(value, f"{prefix}{key}.")
         else:
-            yield f"{prefix}{key}"
+            yield f"{prefix}{key}", value
 
 
-def _refuse_clashes(owners: Mapping[str, str], own: Mapping[str, Any], config: Mapping[str, Any]) -> None:
-    """Raise ValueError where a user's config sets or draws what makes a driver, an authority or a suite what it is.
-
-    Args:
-        owners: whose each path is, for the message.
-        own: the settings that they have.
-        config: the user's changes.
-    """
-    given = set(_paths(config))
-    draws = config.get("randomise", ())
-    drawn = {entry.get("setting") for entry in draws if isinstance(entry, Mapping)}
-    for path, owner in owners.items():
-        parts = tuple(path.split("."))
-        value = at(own, parts) if path in _paths(own) else None  # None where the driver draws it
-        same = value is not None and path in given and at(config, parts) == value
-        if path in drawn or (path in given and not same):
-            what = "draws" if value is None else f"sets to {value!r}"
-            raise ValueError(
-                f"config changes {path!r}, which {owner} {what}; leave it out, or give an entry of your own that has "
-                "it otherwise"
-            )
+def _refuse_clash(owners: Mapping[str, tuple[str, Any]], who: str, path: str, value: Any) -> None:
+    """Raise ValueError where a setting is another's, and has another value there."""
+    owner, present = owners.get(path, (who, value))
+    if owner != who and (present != value or value == DRAWN):
+        what = "draws" if present == DRAWN else f"sets to {present!r}"
+        raise ValueError(
+            f"{who} changes {path!r}, which {owner} {what}; leave it out, or give an entry of your own for it"
+        )
 
 
 def _joined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
-import builtins
 import pickle
+import sys
+import sysconfig
 from collections.abc import Callable, Iterator
 from functools import partial
 from hashlib import sha256
+from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
 
+import shared_control_env
+from shared_control_env.controllers.arrays import as_array
+
+_INSTALLED = [
+    *(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib", "purelib", "platlib")),
+    Path(shared_control_env.__file__).resolve().parent,  # whose sources are told by its version
+]
+"""Folders of code that does not change between runs, or is told otherwise."""
+
+_NOT_CODE = ("__dict__", "__weakref__", "__doc__", "__module__", "__firstlineno__", "__static_attributes__")
+
 
 def fingerprint(make: Callable[..., Any]) -> str:
     """Digest of what makes a driver or an allocator.
 
-    It is made of the code of its class, of what this uses of the same module, and of its arguments. Comments and layout
-    do not count; what is read from files at run time is not seen.
+    It is made of the code of its class, of all that this uses of the user's own modules, and of its arguments. Comments
+    and layout do not count; what is read from files at run time is not seen.
 
     Args:
         make: a class, a function, or a :class:`functools.partial` of one.
@@ -25,87 +38,101 @@ def fingerprint(make: Callable[..., Any]) -> str:
     Raises:
         ValueError: if it holds something whose content cannot be told.
     """
-    return sha256("\n".join(_parts(make, "", set())).encode()).hexdigest()[:16]
+    return sha256("\n".join(_parts(make, {})).encode()).hexdigest()[:16]
 
 
-def _parts(value: Any, module: str, seen: set[int]) -> Iterator[str]:
-    """Texts that say what a value is; of functions and classes of other modules, their names alone."""
-    if id(value) in seen:
-        return
+def _is_own(module: str) -> bool:
+    """Whether a module is the user's, whose code is looked into; of one that is installed the name is enough."""
+    if module == "builtins":
+        return False
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return file is None or not any(folder in Path(file).resolve().parents for folder in _INSTALLED)
+
+
+def _parts(value: Any, seen: dict[int, Any]) -> Iterator[str]:
+    """Texts that say what a value is; what was seen is kept, since the place of what is gone serves others."""
     if isinstance(value, bool | int | float | complex | str | bytes | None | type(Ellipsis)):
         yield repr(value)
         return
-    seen.add(id(value))
-    if isinstance(value, np.ndarray):
-        yield f"{value.dtype} {value.shape} {sha256(np.ascontiguousarray(value).tobytes()).hexdigest()}"
+    if id(value) in seen:
+        yield "seen"
+        return
+    seen[id(value)] = value
+    if isinstance(value, np.ndarray) or hasattr(value, "detach"):
+        array = np.ascontiguousarray(as_array(value))
+        yield f"{array.dtype} {array.shape} {_pickled(array) if array.dtype.hasobject else _digest(array.tobytes())}"
     elif isinstance(value, ModuleType):
         yield value.__name__
-    elif isinstance(value, partial):
-        yield from _parts((value.func, value.args, value.keywords), module, seen)
     elif isinstance(value, CodeType):
         yield from _of_code(value)
     elif hasattr(value, "py_func"):  # compiled by numba
-        yield from _parts(value.py_func, module, seen)
+        yield from _parts(value.py_func, seen)
+    elif isinstance(value, partial):
+        yield from _each((value.func, value.args, value.keywords), seen)
     elif isinstance(value, MethodType):
-        yield from _parts((value.__func__, value.__self__), module, seen)
+        yield from _each((value.__func__, value.__self__), seen)
     elif isinstance(value, type):
-        yield from _of_class(value, module, seen)
+        yield from _of_class(value, seen)
     elif isinstance(value, FunctionType):
-        yield from _of_function(value, module, seen)
+        yield from _of_function(value, seen)
     elif isinstance(value, staticmethod | classmethod):
-        yield from _parts(value.__func__, module, seen)
+        yield from _parts(value.__func__, seen)
     elif isinstance(value, property):
-        yield from _parts((value.fget, value.fset), module, seen)
+        yield from _each((value.fget, value.fset), seen)
     elif isinstance(value, dict):
-        for key in sorted(value, key=str):
-            yield str(key)
-            yield from _parts(value[key], module, seen)
+        for key in sorted(value, key=repr):
+            yield repr(key)
+            yield from _parts(value[key], seen)
     elif isinstance(value, list | tuple):
         yield type(value).__name__
-        for item in value:
-            yield from _parts(item, module, seen)
+        yield from _each(value, seen)
     elif isinstance(value, set | frozenset):
         yield from sorted(map(repr, value))
-    elif hasattr(value, "__dict__") and type(value).__module__ != builtins.__name__:
-        yield from _of_class(type(value), module, seen)
-        yield from _parts(vars(value), module, seen)
+    elif _is_own(type(value).__module__) and hasattr(value, "__dict__"):
+        yield from _of_class(type(value), seen)
+        yield from _parts(vars(value), seen)
     else:
         yield _pickled(value)
 
 
-def _of_class(kind: type, module: str, seen: set[int]) -> Iterator[str]:
+def _each(values: Any, seen: dict[int, Any]) -> Iterator[str]:
+    for value in values:
+        yield from _parts(value, seen)
+
+
+def _of_class(kind: type, seen: dict[int, Any]) -> Iterator[str]:
     yield f"{kind.__module__}.{kind.__qualname__}"
-    if module and kind.__module__ != module:
+    if not _is_own(kind.__module__):
         return
-    for base in kind.__mro__[:-1]:
-        if base.__module__ not in (kind.__module__, builtins.__name__):
-            yield f"{base.__module__}.{base.__qualname__}"
-            continue
-        for name in sorted(vars(base)):
-            if name not in (
-                "__dict__",
-                "__weakref__",
-                "__doc__",
-                "__module__",
-                "__firstlineno__",
-                "__static_attributes__",
-            ):
-                yield name
-                yield from _parts(vars(base)[name], kind.__module__, seen)
+    for name in sorted(vars(kind)):
+        if name not in _NOT_CODE:
+            yield name
+            yield from _parts(vars(kind)[name], seen)
+    yield from _each(kind.__bases__, seen)
 
 
-def _of_function(function: FunctionType, module: str, seen: set[int]) -> Iterator[str]:
+def _of_function(function: FunctionType, seen: dict[int, Any]) -> Iterator[str]:
     yield f"{function.__module__}.{function.__qualname__}"
-    if module and function.__module__ != module:
+    if not _is_own(function.__module__):
         return
     yield from _of_code(function.__code__)
-    yield from _parts((function.__defaults__, function.__kwdefaults__), function.__module__, seen)
+    yield from _each((*(function.__defaults__ or ()), function.__kwdefaults__), seen)
     for cell in function.__closure__ or ():
-        yield from _parts(cell.cell_contents, function.__module__, seen)
-    for name in function.__code__.co_names:
+        try:
+            content = cell.cell_contents
+        except ValueError:  # not assigned yet
+            content = None
+        yield from _parts(content, seen)
+    for name in _names(function.__code__):
         if name in function.__globals__:
             yield name
-            yield from _parts(function.__globals__[name], function.__module__, seen)
+            yield from _parts(function.__globals__[name], seen)
+
+
+def _names(code: CodeType) -> list[str]:
+    """Names that code looks up, that of inner functions and comprehensions too."""
+    inner = [name for constant in code.co_consts if isinstance(constant, CodeType) for name in _names(constant)]
+    return [*code.co_names, *inner]
 
 
 def _of_code(code: CodeType) -> Iterator[str]:
@@ -115,12 +142,16 @@ def _of_code(code: CodeType) -> Iterator[str]:
         if isinstance(constant, CodeType):
             yield from _of_code(constant)
         else:
-            yield repr(constant)
+            yield " ".join(sorted(map(repr, constant))) if isinstance(constant, frozenset) else repr(constant)
+
+
+def _digest(content: bytes) -> str:
+    return sha256(content).hexdigest()
 
 
 def _pickled(value: Any) -> str:
     try:
-        return sha256(pickle.dumps(value, protocol=5)).hexdigest()
+        return _digest(pickle.dumps(value, protocol=5))
     except Exception as error:  # whatever an object's own pickling raises
         raise ValueError(
             f"it cannot be told what {value!r} is ({error}); give a fingerprint: DriverEntry(..., fingerprint='...')"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -10,11 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose
-from shared_control_env.evaluation.episodes import Batch, run
+from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
+from shared_control_env.evaluation.episodes import Batch, run, versions
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import read_manifest
+
+GIVEN = "given: "
+"""Begins a fingerprint that the user gave."""
 
 
 def replay_episode(
@@ -50,17 +54,25 @@ def entries_of(folder: Path, driver: str, authority: str) -> tuple[DriverEntry, 
         ValueError: if the folder has no such names, or a class is not found any more or has changed.
     """
     manifest = read_manifest(folder)
-    known = (
-        choose("driver", driver, manifest["drivers"])[driver],
-        choose("authority", authority, manifest["authorities"])[authority],
+    if manifest["versions"] != versions():
+        warnings.warn(f"{folder} holds results of {manifest['versions']}; now it is {versions()}", stacklevel=2)
+    first = choose_one("driver", driver, manifest["drivers"])
+    second = choose_one("authority", authority, manifest["authorities"])
+    entries = (
+        DRIVERS.get(driver) if first["origin"] == "catalogue" else None,
+        AUTHORITIES.get(authority) if second["origin"] == "catalogue" else None,
     )
-    first: Any = DRIVERS.get(driver) if known[0]["origin"] == "catalogue" else None
-    second: Any = AUTHORITIES.get(authority) if known[1]["origin"] == "catalogue" else None
-    first = first or DriverEntry(
-        "given by the user", _make("driver", driver, known[0]), known[0]["config"], draws=tuple(known[0]["draws"])
+    own_driver = (
+        DriverEntry("given by the user", _make("driver", driver, first), first["config"], draws=tuple(first["draws"]))
+        if entries[0] is None
+        else entries[0]
     )
-    second = second or AuthorityEntry("given by the user", known[1]["law"], _make("authority", authority, known[1]))
-    return first, second, manifest["config"]
+    own_authority = (
+        AuthorityEntry("given by the user", second["law"], _make("authority", authority, second))
+        if entries[1] is None
+        else entries[1]
+    )
+    return own_driver, own_authority, manifest["config"]
 
 
 def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:
@@ -81,7 +93,7 @@ def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:
             found = getattr(found, part)
     except (ImportError, AttributeError) as error:
         raise ValueError(f"{what} {name!r} is {described['origin']}, which cannot be imported: {error}") from None
-    if fingerprint(found) != described["fingerprint"]:
+    if not described["fingerprint"].startswith(GIVEN) and fingerprint(found) != described["fingerprint"]:
         raise ValueError(
             f"{what} {name!r}: {described['origin']} has changed since; its old episodes cannot be replayed"
         )

@@ -22,13 +22,14 @@ from shared_control_env.evaluation.catalogue import (
     DriverEntry,
     Drivers,
     Suite,
-    choose,
+    choose_one,
     chosen_authorities,
     chosen_drivers,
     chosen_suite,
 )
 from shared_control_env.evaluation.episodes import MOST_SEEDS, Batch, plan, settings_of, versions
 from shared_control_env.evaluation.fingerprint import fingerprint
+from shared_control_env.evaluation.replay import GIVEN
 from shared_control_env.evaluation.storage import MAY_GROW, REPORT, TABLE, ResultsFolder, sorted_table, write_atomically
 from shared_control_env.vector.environment import settings_for_kernel
 
@@ -72,7 +73,8 @@ def evaluate(
 
     Returns:
         One row an episode: scenario, degradation, driver, authority, seed, whether it was terminated, its
-        duration [s], every metric of :data:`metrics.METRICS`, digest of its settings, versions.
+        duration [s], the driver's K_h and T_h [s], when a person at rest noticed something [s], every metric of
+        :data:`metrics.METRICS`, digest of its settings, versions.
 
     Raises:
         ValueError: for unknown names, naming the nearest and all valid ones; for what makes no driver or allocator, or
@@ -82,7 +84,9 @@ def evaluate(
     numbers = _checked_seeds(seeds)
     if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
         raise ValueError(f"jobs = {jobs!r} must be an integer of at least 1")
-    choose("engine", engine, dict.fromkeys(ENGINES))
+    choose_one("engine", engine, dict.fromkeys(ENGINES))
+    if not isinstance(fresh, bool):
+        raise ValueError(f"fresh = {fresh!r} must be True or False")
     if config is not None and not isinstance(config, Mapping):
         raise ValueError(f"config = {config!r} must be a dict")
     changes = as_plain(config or {})
@@ -137,7 +141,11 @@ def _check_settings(batches: Sequence[Batch]) -> None:
         key = batch.scenario, json.dumps(config, sort_keys=True, default=repr)
         if key not in seen:
             seen.add(key)
-            settings_for_kernel(CASES[batch.scenario], config)
+            settings = settings_for_kernel(CASES[batch.scenario], config)
+            if settings.has_person and batch.driver[1].make is not None:
+                raise ValueError(
+                    f"config['person']['active'] = True would not act: {batch.driver[0]!r} is no driver of the kernel"
+                )
 
 
 def _described(
@@ -163,7 +171,7 @@ def _described(
     module, path = getattr(entry.make, "__module__", None), getattr(entry.make, "__qualname__", None)
     found = module not in (None, "__main__", "__mp_main__") and path is not None and "<" not in path
     try:
-        print_ = entry.fingerprint or fingerprint(entry.make)
+        print_ = fingerprint(entry.make) if entry.fingerprint is None else f"{GIVEN}{entry.fingerprint}"
     except ValueError as error:
         raise ValueError(f"{what} {name!r}: {error}") from None
     return {"origin": f"{module}:{path}" if found else None, "fingerprint": print_, **own}

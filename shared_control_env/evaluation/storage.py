@@ -100,7 +100,8 @@ class ResultsFolder:
         try:
             if path.exists() and not path.is_dir():
                 raise ValueError(f"{path} is a file; choose a folder for the results")
-            there = read_manifest(path) if path.exists() and _entries(path) else None
+            if path.exists() and _entries(path):
+                read_manifest(path)  # lest a lock is put into a foreign folder
             path.mkdir(parents=True, exist_ok=True)
             self._lock.acquire(timeout=0)
         except Timeout:
@@ -108,6 +109,7 @@ class ResultsFolder:
         except OSError as error:
             raise ValueError(f"{path} cannot be written to: {error.strerror or error}") from None
         try:
+            there = read_manifest(path) if _entries(path) else None
             if there is not None and fresh:
                 self._remove_results()
             elif there is not None:
@@ -162,7 +164,8 @@ class ResultsFolder:
         files, foreign, damaged = {}, [], 0
         for folder in (self.path, self.path / BATCHES):
             for draft in folder.glob(f"{_DRAFT}*"):  # of a run that was killed
-                draft.unlink()
+                if _is_own_draft(draft.name):
+                    draft.unlink()
         for path in sorted((self.path / BATCHES).glob("*")):
             match = _BATCH.fullmatch(path.name)
             if match is None or match[2] != self._benchmark:
@@ -225,7 +228,13 @@ def _digest_of(entries: Mapping[str, Any], name: str) -> str:
 
 def _entries(path: Path) -> list[str]:
     """What a folder holds, without what a run that did not get far leaves."""
-    return [entry.name for entry in path.iterdir() if entry.name != _LOCK and not entry.name.startswith(_DRAFT)]
+    return [entry.name for entry in path.iterdir() if entry.name != _LOCK and not _is_own_draft(entry.name)]
+
+
+def _is_own_draft(name: str) -> bool:
+    """Whether a file is one that :func:`write_atomically` left half written in such a folder."""
+    written = name.removeprefix(_DRAFT)
+    return written != name and (written in (MANIFEST, TABLE, REPORT) or _BATCH.fullmatch(written) is not None)
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
@@ -234,6 +243,8 @@ def read_manifest(path: Path) -> dict[str, Any]:
     Raises:
         ValueError: if it holds no results of a benchmark, or of a version with another layout.
     """
+    if not path.exists():
+        raise ValueError(f"{path}: there is no such folder")
     try:
         manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -241,7 +252,8 @@ def read_manifest(path: Path) -> dict[str, Any]:
     whole = isinstance(manifest, dict) and manifest.get("format") == FORMAT
     if not whole or not all(isinstance(manifest.get(part), dict) for part in MAY_GROW):
         raise ValueError(
-            f"{path} holds files that are no results of a benchmark of this version; choose another folder"
+            f"{path} holds files that are no results of a benchmark of this version; choose another folder, or remove "
+            "what is in it by hand"
         )
     return manifest
 

@@ -13,6 +13,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from shared_control_env.controllers.arrays import as_array
 from shared_control_env.core.delaunay import MAX_HOLES
 from shared_control_env.core.info import INFO
 from shared_control_env.core.jit import is_interpreted
@@ -30,7 +31,7 @@ from shared_control_env.envs.cases import CASES, Case
 from shared_control_env.envs.episode import draw_episode, is_random
 from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.settings import OWN_TRAFFIC, Settings, plain
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, Clipping, as_array, space_of
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLACK, SLOT_SPACES, Clipping, space_of
 from shared_control_env.vector import cold_start, kernel
 from shared_control_env.vector.records import (
     NOT_LOADED,
@@ -138,7 +139,9 @@ class SharedControlVectorEnv(VectorEnv):
         self._viewer_env: Any = None
         self._noted = np.zeros(self.num_envs, INFO)
         self._drawn = {"rgb_array": self.num_envs, "human": 1}.get(render_mode or "", 0)
-        settings = settings_for_kernel(case, config or {})
+        settings = settings_for_kernel(case, {} if config is None else config)
+        if settings.has_person and not driver:
+            raise ValueError("config['person']['active'] = True would not act: it needs driver=True")
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._define_spaces()
         few = max(1, num_envs // FEWEST_PER_THREAD)
@@ -194,7 +197,7 @@ class SharedControlVectorEnv(VectorEnv):
             memories=np.zeros(n, MEMORY),
             automations=np.zeros(n, AUTOMATION_MEMORY),
             fault_memories=np.zeros((n, sizes.faults), FAULT_MEMORY),
-            persons=np.zeros(n, PERSON_MEMORY),
+            persons=np.zeros(n if self._driver else 0, PERSON_MEMORY),
             crashed=np.zeros(n, dtype=bool),
             ended=np.zeros(n, dtype=bool),
         )
@@ -222,13 +225,13 @@ class SharedControlVectorEnv(VectorEnv):
 
     @property
     def scenes(self) -> np.ndarray:
-        """What the sensors of each environment give, records of :data:`records.SCENE`, shape (N,)."""
-        return self._batch.scenes
+        """What the sensors of each environment give, records of :data:`records.SCENE`, shape (N,); read only."""
+        return _read_only(self._batch.scenes)
 
     @property
     def signals(self) -> np.ndarray:
         """Signals planned for the present step of each environment, records of :data:`records.SIGNALS`, shape (N,)."""
-        return self._batch.signals
+        return _read_only(self._batch.signals)
 
     @property
     def episodes(self) -> tuple[Settings, ...]:
@@ -505,6 +508,7 @@ class SharedControlVectorEnv(VectorEnv):
         drawn = {}
         if self._random:
             drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
+        self._clipping.clear(mask)
         self._batch.ended[mask] = True  # so that the kernel begins them, even if an interrupt comes between
         for i, episode in drawn.items():
             self._episodes[i] = episode
@@ -611,7 +615,7 @@ class SharedControlVectorEnv(VectorEnv):
                     f"it must be finite, in [{low:g}, {high:g}]"
                 )
             low, high = self._open_bounds[slot]
-            self._clipping.note(slot, array, bool(array.max() > high or array.min() < low))
+            self._clipping.note(slot, array, bool(array.max() > high + SLACK or array.min() < low - SLACK))
             values[slot] = array
         return Actions(values[DRIVER], values[AUTHORITY])
 
@@ -685,6 +689,13 @@ def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
         names = [each.name.lower() for each in AutoresetMode]
         raise ValueError(f"autoreset_mode = {mode!r} must be an AutoresetMode or one of {sorted(names)}")
     return spellings[text]
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    """A view that cannot be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def _is_integer(value: Any) -> bool:

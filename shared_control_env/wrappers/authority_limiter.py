@@ -11,7 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 from shared_control_env.controllers.allocators import Allocator, checked_authority
 from shared_control_env.core import single
 from shared_control_env.envs.slots import AUTHORITY
-from shared_control_env.wrappers.slots import SlotWrapper
+from shared_control_env.wrappers.slots import SlotWrapper, check_reset
 
 
 class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
@@ -35,6 +35,8 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
             raise ValueError(
                 f"allocator = {allocator!r} must be an object with reset(seed) and allocate(scene, signals) -> alpha_a"
             )
+        if allocator is not None:
+            check_reset(allocator, "allocator")
         self.allocator = allocator
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -48,5 +50,6 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
     def decide(self) -> np.ndarray:
         """alpha_a of the planned step, shape (1,)."""
         if self.allocator is not None:
-            return np.array([checked_authority(self.allocator.allocate(self.shared.scene, self.shared.signals))])
+            scene, signals = self.shared.scene.copy(), self.shared.signals.copy()  # so that none is changed
+            return np.array([checked_authority(self.allocator.allocate(scene, signals))])
         return np.array([single.fuzzy_authority(self.shared.signals, self.shared.parameters)])

@@ -12,7 +12,7 @@ from gymnasium.utils import RecordConstructorArgs
 from shared_control_env.controllers.driver import Driver, PersonDriver, checked_command, driver_of
 from shared_control_env.envs.settings import parameters_of
 from shared_control_env.envs.slots import DRIVER
-from shared_control_env.wrappers.slots import SlotWrapper
+from shared_control_env.wrappers.slots import SlotWrapper, check_reset
 
 
 class DriverModel(SlotWrapper, RecordConstructorArgs):
@@ -37,8 +37,12 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
             raise ValueError(
                 f"driver = {driver!r} must be an object with reset(seed) and act(observation, scene) -> [a, delta]"
             )
+        if driver is not None:
+            check_reset(driver, "driver")
+            if self.shared.settings.has_person:
+                raise ValueError("config['person']['active'] = True would not act: another driver is given")
         self._given = driver
-        self.driver: Driver = driver or driver_of(parameters_of(self.shared.episode))
+        self.driver: Driver = driver_of(parameters_of(self.shared.episode)) if driver is None else driver
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset environment and driver; the driver's seed is drawn from the environment's generator."""
@@ -56,8 +60,12 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
 
     def decide(self) -> np.ndarray:
         """The driver's command over its limits, shape (2,)."""
-        command = checked_command(self.driver.act(self.shared.observation, self.shared.scene))
-        return command / self.shared.command_limits
+        shared = self.shared
+        if self._given is None:
+            return checked_command(self.driver.act(shared.observation, shared.scene)) / shared.command_limits
+        # Copies, since what another's driver does to them must not reach the simulation.
+        command = checked_command(self.driver.act(shared.observation.copy(), shared.scene.copy()))
+        return np.clip(command / shared.command_limits, -1.0, 1.0)
 
     def _report(self) -> dict[str, Any]:
         """The solver's report, with one form from the reset on."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import gymnasium as gym
@@ -51,6 +52,14 @@ class SlotWrapper(gym.ActionWrapper):
             return value
         (other,) = self.open_slots
         return {self.slot: value, other: action}
+
+
+def check_reset(player: Any, what: str) -> None:
+    """Raise ValueError unless a driver's or an allocator's ``reset`` takes a seed."""
+    try:
+        inspect.signature(player.reset).bind(seed=0)
+    except TypeError:
+        raise ValueError(f"{what} = {player!r}: its reset must take a seed, as in reset(self, seed=None)") from None
 
 
 def open_slots(env: gym.Env) -> tuple[str, ...]:

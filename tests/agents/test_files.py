@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from agents.drivers import POLICIES, authority_entry, driver_entry
+from shared_control_env.evaluation.fingerprint import fingerprint
 
 STORED = dict(np.load(POLICIES / "driver-0.npz"))
 CARD = json.loads(str(STORED["card"]))
@@ -102,6 +103,6 @@ def test_a_model_trained_on_normalised_observations_is_refused(tmp_path):
 def test_the_same_name_with_another_content_is_another_driver(tmp_path):
     path = tmp_path / "p.npz"
     np.savez(path, **STORED)
-    before = driver_entry(str(path)).fingerprint
+    before = fingerprint(driver_entry(str(path)).make)
     np.savez(path, **{**STORED, "b2": STORED["b2"] + 0.1})
-    assert driver_entry(str(path)).fingerprint != before
+    assert fingerprint(driver_entry(str(path)).make) != before

@@ -11,7 +11,7 @@ command = st.floats(-5.0, 5.0)
 
 def actual(law, u_des, u_f, alpha):
     u_act = np.empty(2)
-    apply_law(LAWS.index(law), np.array(u_des), np.array(u_f), alpha, LawParameters(), u_act)
+    apply_law(LAWS.index(law), np.array(u_des), np.array(u_f), alpha, LawParameters(), False, u_act)
     return u_act
 
 

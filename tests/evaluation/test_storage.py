@@ -1,17 +1,20 @@
 """No row is lost, mixed or made up: names of any kind, damaged and foreign files, two runs at once, changed drivers."""
 
+import os
 import subprocess
 import sys
 import threading
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from shared_control_env.controllers.scripted import OverreactingDriver, ScriptedDriver
-from shared_control_env.evaluation import AuthorityEntry, DriverEntry, Suite, evaluate
+from shared_control_env.evaluation import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, Suite, evaluate
 from shared_control_env.evaluation import storage as storage_module
+from shared_control_env.evaluation.episodes import Batch, make_environment, settings_of
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.replay import entries_of, replay_episode
 from shared_control_env.evaluation.storage import IDENTITY, ResultsFolder, read_manifest
@@ -131,9 +134,11 @@ def test_a_run_that_was_killed_keeps_nobody_out(tmp_path):
         f"folder = ResultsFolder(Path(sys.argv[1]), {MANIFEST!r})\nos._exit(9)"
     )
     assert subprocess.run([sys.executable, "-c", code, str(tmp_path)]).returncode == 9
-    (tmp_path / ".draft-x").write_text("half")
+    (tmp_path / ".draft-benchmark.json").write_text("half")
+    (tmp_path / ".draft-thesis.txt").write_text("mine")
     ResultsFolder(tmp_path, MANIFEST).close()
-    assert not (tmp_path / ".draft-x").exists()
+    assert not (tmp_path / ".draft-benchmark.json").exists()
+    assert (tmp_path / ".draft-thesis.txt").exists()
 
 
 def test_what_counts_is_on_the_disk(tmp_path, monkeypatch):
@@ -158,6 +163,109 @@ def test_a_changed_driver_is_run_again_and_the_old_one_found_again(tmp_path):
         again = evaluate({"mine": Coast}, "none", ONE, out=tmp_path, progress=lambda *n: told.append(n))
     assert told == [(1, 1)]
     pd.testing.assert_frame_equal(again, coasting)
+
+
+def test_one_seed_gives_every_driver_the_same_episode():
+    suite = Suite("x", ("cut_in", "bend"), ("bias_ramp", "stuck", "white_noise"))
+    batches = [
+        Batch(scenario, (name, entry), ("none", AUTHORITIES["none"]), ((degradation, seed),), {})
+        for scenario in suite.scenarios
+        for degradation in suite.degradations
+        for seed in (0, 7)
+        for name, entry in DRIVERS.items()
+    ]
+    episodes = {}
+    for batch in batches:
+        env = make_environment(batch)
+        (degradation, seed), *_ = batch.episodes
+        env.reset(seed=seed, options={"config": settings_of(batch, degradation)})
+        drawn = env.episodes[0].model_dump(exclude={"driver_lag", "internal_model", "person"})
+        episodes.setdefault((batch.scenario, degradation, seed), []).append(drawn)
+    for same in episodes.values():
+        assert len(same) == len(DRIVERS)
+        assert all(episode == same[0] for episode in same)
+
+
+def test_the_same_scenario_twice_is_run_once(tmp_path):
+    suite = Suite("x", ("two_lane", "two_lane"), (None, None))
+    assert len(evaluate("none", "none", suite)) == len(evaluate("none", "none", suite, out=tmp_path)) == 1
+
+
+def test_numbers_of_numpy_in_entries():
+    entry = DriverEntry(
+        "",
+        None,
+        {"driver_lag": {"K_h": np.float32(1.1)}},
+        draws=[{"setting": "driver_lag.T_h", "median": np.float64(0.2), "spread": 0.1}],
+    )
+    assert evaluate({"mine": entry}, "none", ONE)["K_h"][0] == pytest.approx(1.1)
+
+
+def test_a_given_fingerprint_is_trusted_when_an_episode_is_replayed(tmp_path):
+    evaluate({"mine": DriverEntry("", Coast, fingerprint="v1")}, "none", ONE, out=tmp_path)
+    driver, _, _ = entries_of(tmp_path, "mine", "none")
+    assert driver.make is Coast
+
+
+def test_results_of_another_version_are_replayed_with_a_word(tmp_path):
+    evaluate("none", "none", ONE, out=tmp_path)
+    path = tmp_path / "benchmark.json"
+    path.write_text(path.read_text().replace("numba ", "numba 9."))
+    with pytest.warns(UserWarning, match="numba 9"):
+        entries_of(tmp_path, "none", "none")
+
+
+def test_what_cannot_be_sent_to_a_process_is_said():
+    with pytest.raises(RuntimeError, match="driver 'mine' or authority 'none' cannot be sent to another process"):
+        evaluate({"mine": lambda: Coast()}, "none", ONE, jobs=2)
+
+
+SET_OF_TEXTS = """
+import sys; sys.path.insert(0, {root!r})
+from shared_control_env.evaluation.fingerprint import fingerprint
+class Own:
+    def act(self, observation, scene):
+        return observation in {{"alpha", "beta", "gamma"}}
+print(fingerprint(Own))
+"""
+
+
+def test_fingerprints_repeat_in_other_processes():
+    found = set()
+    for seed in ("1", "2", "3"):
+        code = SET_OF_TEXTS.format(root=str(Path(__file__).parent.parent.parent))
+        result = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONHASHSEED": seed}
+        )
+        assert result.returncode == 0, result.stderr
+        found.add(result.stdout)
+    assert len(found) == 1
+
+
+def test_fingerprints_see_defaults_and_what_inner_functions_use():
+    def with_defaults(first, second):
+        class Own:
+            def reset(self, seed=first):
+                pass
+
+            def act(self, observation, scene=second):
+                pass
+
+        return Own
+
+    def with_inner(gain):
+        space = {"GAIN": gain, "__name__": "elsewhere"}
+        exec(
+            "class Own:\n    def act(self, o, s):\n        return [GAIN * e for e in o] + list(map(lambda e: GAIN, o))",
+            space,
+        )
+        return space["Own"]
+
+    torch = pytest.importorskip("torch")
+    variants = [with_defaults(1, 2), with_defaults(1, 3), with_defaults(2, 2), with_inner(1.0), with_inner(2.0)]
+    variants += [partial(Needs, torch.tensor([1.0])), partial(Needs, torch.tensor([2.0]))]
+    variants += [partial(Needs, pd.DataFrame({"a": [1]})), partial(Needs, pd.DataFrame({"a": [2]}))]
+    assert len({fingerprint(each) for each in variants}) == len(variants)
 
 
 def made_like(body, helper=1.0):
@@ -258,6 +366,16 @@ def test_what_agrees_with_an_entry_is_taken():
     assert evaluate("mpc", "none", ONE, config={"driver_lag": {"K_h": 0.0}})["driver_effort"][0] == 0.0
 
 
+class Needs(Coast):
+    def __init__(self, needed):
+        self.needed = needed
+
+
+class NoSeed(Coast):
+    def reset(self):
+        pass
+
+
 class Allocates:
     def reset(self, seed=None):
         pass
@@ -283,8 +401,29 @@ WRONG = {
     "jobs of None": ({"jobs": None}, "jobs = None must be an integer"),
     "a suite of an unknown scenario": ({"suite": Suite("x", ("two_lan",), (None,))}, "did you mean 'two_lane'"),
     "a suite of an unknown degradation": ({"suite": Suite("x", ("bend",), ("stuk",))}, "did you mean 'stuck'"),
-    "an empty suite": ({"suite": Suite("x", (), (None,))}, "names nothing"),
-    "a suite without degradations": ({"suite": Suite("x", ("bend",), ())}, "degradations = "),
+    "an empty suite": ({"suite": Suite("x", (), (None,))}, "tuple of names, not empty"),
+    "a suite without degradations": ({"suite": Suite("x", ("bend",), ())}, "tuple of names, not empty"),
+    "a suite of a text": ({"suite": Suite("x", "bend", (None,))}, "tuple of names, not empty"),
+    "all suites": ({"suite": "all"}, "suite = 'all' must be one name"),
+    "several suites": ({"suite": ["paper", "full"]}, "must be one name"),
+    "all engines": ({"engine": "all"}, "engine = 'all' must be one name"),
+    "nobody": ({"driver": {"mine": None}}, "driver 'mine' is None"),
+    "an entry by itself": ({"driver": DriverEntry("mine", Coast)}, "driver"),
+    "draws of another kind": ({"driver": {"mine": DriverEntry("", Coast, draws=3)}}, "'mine' has draws = 3"),
+    "draws in the config": ({"driver": {"mine": DriverEntry("", Coast, {"randomise": []})}}, "what is drawn in draws"),
+    "a class that needs arguments": ({"driver": {"mine": Needs}}, "driver 'mine'.*gave an error, TypeError"),
+    "a reset without a seed": ({"driver": {"mine": NoSeed}}, "driver 'mine': its reset must take a seed"),
+    "a driver with another law": (
+        {"driver": {"mine": DriverEntry("", Coast, {"authority": {"law": "paper"}})}},
+        "'mine' changes 'authority.law', which the authority 'none' sets to 'none'",
+    ),
+    "a person who does not drive": (
+        {"driver": {"mine": Coast}, "config": {"person": {"active": True}}},
+        "would not act",
+    ),
+    "half a character": ({"driver": {"\ud800": Coast}}, "must be a name"),
+    "fresh as a text": ({"fresh": "no"}, "fresh = 'no' must be True or False"),
+    "randomise of None": ({"config": {"randomise": None}}, "randomise"),
     "a config that is none": ({"config": 3}, "config = 3 must be a dict"),
     "a setting that is none": ({"config": {"duratoin": 3.0}}, "did you mean 'duration'"),
     "what the kernel does not know": (

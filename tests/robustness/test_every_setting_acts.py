@@ -1,5 +1,6 @@
 """Every setting of the schema, changed by itself, changes something that can be observed, or is refused by name."""
 
+import copy
 import warnings
 
 import gymnasium as gym
@@ -45,6 +46,7 @@ RESTING = {
     "randomise": [],
 }
 BESIDE = {
+    "ego.lane": {"road": {"lanes": 3}},
     "longitudinal_risk.sigma_x": {"longitudinal_risk": {"preset": "paper"}},
     "longitudinal_risk.preset": {},
     "law_tolerances.tolerance_a": {"authority": {"law": "paper"}},
@@ -93,7 +95,7 @@ VALUES = {
     "simulation_frequency": 40,
     "offscreen_rendering": False,
     "road.lanes": 3,
-    "ego.lane": 1,
+    "ego.lane": 2,
     "duration": 1.0,
     "law_tolerances.tolerance_a": 3.0,
     "law_tolerances.tolerance_delta": 0.3,
@@ -209,7 +211,7 @@ def other_value(path, config):
 @pytest.mark.parametrize("path", [path for path in LEAVES if path.split(".")[0] not in NOT_DRAWN])
 def test_it_can_be_drawn_or_is_refused(path):
     config = configuration.merge(configuration.plain(Settings()), {**BUSY, "randomise": []})
-    config = configuration.merge(config, BESIDE.get(path, {}) if path.startswith(("internal_model", "person")) else {})
+    config = configuration.merge(config, BESIDE.get(path, {}))
     present = configuration.changes.at(config, tuple(path.split(".")))
     if not is_number(VALUES.get(path, present)):
         with pytest.raises(ValueError, match=r"no number|must have"):
@@ -233,7 +235,7 @@ def is_number(value):
 
 @pytest.mark.parametrize("path", LEAVES)
 def test_assigned_to_the_config_it_counts_from_the_next_reset_on(path):
-    busy = {**BUSY, **BESIDE[path]} if path.startswith(("internal_model", "person")) and path in BESIDE else BUSY
+    busy = {**BUSY, **BESIDE.get(path, {})}
     env = gym.make("SharedControl/TwoLane-v0", config=busy).unwrapped
     config = configuration.merge(configuration.plain(Settings()), BUSY)
     value = VALUES[path] if path in VALUES else other_value(path, config)
@@ -297,11 +299,61 @@ def test_a_whole_section_set_by_name_is_not_drawn():
     assert env.unwrapped.episode.lane_change is None
 
 
-def test_another_environments_config_is_taken_as_it_is():
-    bend = gym.make("SharedControl/Bend-v0")
-    copy = gym.make("SharedControl/TwoLane-v0", config=bend.unwrapped.config)
-    assert copy.unwrapped.config == bend.unwrapped.config
-    np.testing.assert_array_equal(copy.reset(seed=4)[0], bend.reset(seed=4)[0])
+def test_a_whole_config_that_was_edited_acts_or_is_refused():
+    name = "SharedControl/CutIn-v0"
+    config = copy.deepcopy(gym.make(name).unwrapped.config)
+    again = gym.make(name, config=config)
+    np.testing.assert_array_equal(again.reset(seed=4)[0], gym.make(name).reset(seed=4)[0])
+    config["ego"]["speed"] = 20.0
+    with pytest.raises(ValueError, match=r"draws 'ego\.speed', which is set to 20\.0 too"):
+        gym.make(name, config=config)
+    config["randomise"] = []
+    assert gym.make(name, config=config).reset(seed=4)[1]["speed"] == 20.0
+
+
+def test_a_setting_cannot_be_taken_away():
+    env = gym.make("SharedControl/Bend-v0").unwrapped
+    del env.config["randomise"]
+    with pytest.raises(ValueError, match="config lacks 'randomise'"):
+        env.reset(seed=0)
+
+
+DRAWS = {
+    "no choices": ({"setting": "ego.speed", "choices": []}, "choices"),
+    "both": ({"setting": "ego.speed", "low": 1.0, "high": 2.0, "choices": [1.0]}, "must have either"),
+    "half": ({"setting": "ego.speed", "low": 1.0}, "must have either"),
+    "two ways": ({"setting": "ego.speed", "median": 1.0, "spread": 0.1, "low": 1.0}, "must have either"),
+    "a seed": ({"setting": "person.seed", "low": 0, "high": 9}, "cannot be drawn"),
+    "another spelling": ({"setting": "vehicles.00.speed", "low": 9.0, "high": 10.0}, "no setting '00'"),
+    "a frequency": ({"setting": "policy_frequency", "choices": [10, 20]}, "cannot be drawn"),
+    "too wide": ({"setting": "ego.speed", "median": 30.0, "spread": 1.0}, "draws a value that is not allowed"),
+}
+
+
+@pytest.mark.parametrize(("entry", "message"), DRAWS.values(), ids=list(DRAWS))
+def test_what_cannot_be_drawn_is_refused(entry, message):
+    with pytest.raises(ValueError, match=message):
+        gym.make("SharedControl/TwoLane-v0", config={"randomise": [entry]})
+
+
+def test_a_setting_is_drawn_once_and_one_left_at_its_default_too():
+    twice = [{"setting": "ego.speed", "low": 9.0, "high": 10.0}] * 2
+    with pytest.raises(ValueError, match="as entry 0 does"):
+        gym.make("SharedControl/TwoLane-v0", config={"randomise": twice})
+    fault = {
+        "faults": [{"onset": 0.5, "size": 0.1}],
+        "randomise": [{"setting": "faults.0.ramp", "low": 0.5, "high": 1.0}],
+    }
+    env = gym.make("SharedControl/TwoLane-v0", config=fault)
+    env.reset(seed=0)
+    assert 0.5 <= env.unwrapped.episode.faults[0].ramp <= 1.0
+
+
+@pytest.mark.parametrize("config", [[], 0, "", False])
+def test_what_is_no_config_is_refused(config):
+    for make in (gym.make, lambda name, config: gym.make_vec(name, num_envs=1, config=config)):
+        with pytest.raises(ValueError, match="must be a dict"):
+            make("SharedControl/TwoLane-v0", config=config)
 
 
 @pytest.mark.parametrize("key", ["duration", "randomise"])
@@ -311,6 +363,10 @@ def test_the_kernels_config_says_that_it_is_read_only(key):
         env.unwrapped.config[key] = 1.0
     with pytest.raises(TypeError, match="read only"):
         env.unwrapped.config["ego"]["speed"] = 1.0
+    with pytest.raises(TypeError, match="read only"):
+        env.unwrapped.config["vehicles"][0]["speed"] = 1.0
+    with pytest.raises(TypeError, match="read only"):
+        env.unwrapped.config["faults"].append({})
 
 
 def test_the_kernel_refuses_to_draw_what_all_share():

@@ -17,6 +17,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import RecordVideo
 from highway_env.envs.common.abstract import AbstractEnv
 
+from shared_control_env.controllers.allocators import FixedAuthority
 from shared_control_env.controllers.automation import Automation
 from shared_control_env.controllers.solution import Solution
 from shared_control_env.envs import SharedControlEnv, TwoLaneEnv
@@ -157,8 +158,99 @@ def test_an_automation_that_gives_no_command_is_named():
 
     env = TwoLaneEnv()
     env.automation = Broken()
-    with pytest.raises(ValueError, match=r"automation.act\(\) gave"):
+    with pytest.raises(ValueError, match=r"automation: act\(\) gave"):
         env.reset(seed=0)
+
+
+@pytest.mark.parametrize("answer", [None, np.zeros(2), "left"])
+def test_an_automation_that_gives_no_solution_is_named(answer):
+    class Odd:
+        def reset(self):
+            pass
+
+        def act(self, scene):
+            return answer
+
+    env = TwoLaneEnv()
+    env.automation = Odd()
+    with pytest.raises(ValueError, match=r"automation.act\(\) gave .* no controllers.solution.Solution"):
+        env.reset(seed=0)
+
+
+class Scribbles:
+    """Writes into all that it is given."""
+
+    def reset(self, seed=None):
+        pass
+
+    def act(self, observation, scene):
+        scene["z"][:] = 0.0
+        observation[:] = 0.0
+        return np.zeros(2)
+
+    def allocate(self, scene, signals):
+        signals["u_a_f"][:] = 0.0
+        scene["z"][:] = 0.0
+        return 1.0
+
+
+def test_what_others_write_into_scenes_and_signals_does_not_reach_the_drive():
+    config = {"authority": {"law": "proportional"}}
+    quiet = DriverModel(AuthorityLimiter(TwoLaneEnv(config), FixedAuthority(1.0)), Gives(np.zeros(2)))
+    loud = DriverModel(AuthorityLimiter(TwoLaneEnv(config), Scribbles()), Scribbles())
+    for env in (quiet, loud):
+        env.reset(seed=0)
+    for _ in range(30):
+        np.testing.assert_array_equal(quiet.step(0)[4]["state"], loud.step(0)[4]["state"])
+    many = gym.make_vec(TWO_LANE, num_envs=2).unwrapped
+    many.reset(seed=0)
+    with pytest.raises(ValueError, match="read-only"):
+        many.scenes["z"][:] = 0.0
+
+
+def test_a_driver_who_asks_for_more_than_the_limits_is_clipped_without_a_word():
+    env = DriverModel(gym.make(TWO_LANE), Gives([-8.0, 0.0]))
+    env.reset(seed=0)
+    for _ in range(30):
+        info = env.step(0)[4]
+    assert info["u_h_des"][0] == -5.0
+
+
+class Empty:
+    """A driver and an automation that counts as nothing where it is asked whether it is."""
+
+    def __bool__(self):
+        return False
+
+    def reset(self, seed=None):
+        pass
+
+    def act(self, observation, scene=None):
+        if scene is not None:
+            return np.array([0.5, 0.0])
+        return Solution(np.array([0.25, 0.0]), True, 0, 0, 0.0, 0.0, 0.0)
+
+
+def test_what_counts_as_nothing_is_taken_all_the_same():
+    env = DriverModel(gym.make(TWO_LANE, automation=Empty()), Empty())
+    env.reset(seed=0)
+    info = env.step(0)[4]
+    assert info["u_h_des"][0] == 0.5
+    assert info["u_a_des"][0] == 0.25
+
+
+def test_a_person_beside_another_driver_is_refused():
+    config = {"person": {"active": True}}
+    with pytest.raises(ValueError, match="would not act: another driver is given"):
+        DriverModel(gym.make(TWO_LANE, config=config), Gives(np.zeros(2)))
+    with pytest.raises(ValueError, match="needs driver=True"):
+        gym.make_vec(TWO_LANE, num_envs=2, config=config)
+
+
+def test_numbers_of_numpy_do_not_keep_a_spec_from_json():
+    env = gym.make(TWO_LANE, config={"duration": np.float64(3.0), "centering_position": np.array([0.4, 0.5])})
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.config["duration"] == 3.0
 
 
 def test_a_step_interrupted_in_the_automation_leaves_the_scene_true():
@@ -366,7 +458,19 @@ def test_a_command_becomes_an_action():
 
 
 @pytest.mark.parametrize(
-    "path", ["os.system", "math.pi", "builtins.dict", "..", "", "highway_env.vehicle.objects.Obstacle", "nothing.Here"]
+    "path",
+    [
+        "os.system",
+        "math.pi",
+        "builtins.dict",
+        "..",
+        "",
+        "highway_env.vehicle.objects.Obstacle",
+        "nothing.Here",
+        "highway_env.vehicles.behavior.IDMVehicle",
+        "shared_control_env.envs.vehicles.EgoVehicle",
+        "shared_control_env.envs.vehicles.ArrayVehicle",
+    ],
 )
 def test_other_vehicles_are_vehicles(path):
     with pytest.raises(ValueError, match="other_vehicles_type"):

@@ -66,7 +66,7 @@ def at(config: Any, path: tuple[str, ...]) -> Any:
         ValueError: if there is none, naming the part that is wrong and the nearest valid one.
     """
     for key in path:
-        if isinstance(config, list) and key.isdigit() and int(key) < len(config):
+        if isinstance(config, list) and key.isdigit() and str(int(key)) == key and int(key) < len(config):
             config = config[int(key)]
         elif isinstance(config, Mapping) and key in config:
             config = config[key]
@@ -77,7 +77,14 @@ def at(config: Any, path: tuple[str, ...]) -> Any:
 
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
-    """The changes that lead from one config to another, so that ``merge(old, changes)`` is the new one."""
+    """The changes that lead from one config to another, so that ``merge(old, changes)`` is the new one.
+
+    Raises:
+        ValueError: if the new one lacks a setting.
+    """
+    for key in old:
+        if key not in new:
+            raise ValueError(f"config lacks {key!r}; a setting can be changed, not taken away")
     changes: dict[str, Any] = {}
     for key, value in new.items():
         before = old.get(key)
@@ -92,8 +99,6 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]
 def change(config: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """Config with a user's changes: what they name is no longer drawn.
 
-    A config that names everything, such as another environment's, is taken as it is.
-
     Args:
         config: settings as a plain dict.
         changes: nested dict.
@@ -102,8 +107,6 @@ def change(config: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
         ValueError: for an unknown key; or if the changes give a setting another value and have it drawn too.
     """
     merged = merge(config, changes)
-    if set(changes) == set(config):
-        return merged
     paths = {".".join(path): path for path in named(changes, config)}
     if "randomise" not in changes:
         merged["randomise"] = [entry for entry in config["randomise"] if not _concerns(entry["setting"], paths)]
@@ -124,17 +127,35 @@ def _concerns(setting: str, paths: Mapping[str, Any]) -> bool:
     return any(setting == path or setting.startswith(f"{path}.") for path in paths)
 
 
+def _refuse(self: Any, *arguments: Any, **more: Any) -> Any:
+    raise TypeError("this config is read only; settings are changed by reset(options={'config': ...})")
+
+
 class ReadOnly(dict[str, Any]):
     """A dict of settings, and those in it, that refuses to be changed where that would be lost."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
-        super().__init__({k: ReadOnly(v) if isinstance(v, Mapping) else v for k, v in values.items()})
-
-    def _refuse(self, *arguments: Any, **more: Any) -> Any:
-        raise TypeError("this config is read only; settings are changed by reset(options={'config': ...})")
+        super().__init__({key: _read_only(value) for key, value in values.items()})
 
     __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles and copies are plain dicts, which are their owner's."""
         return dict, (list(self.items()),)
+
+
+class ReadOnlyList(list[Any]):
+    """A list of such settings."""
+
+    __setitem__ = __delitem__ = __iadd__ = __imul__ = append = extend = insert = pop = remove = clear = _refuse
+    sort = reverse = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickles and copies are plain lists, which are their owner's."""
+        return list, (tuple(self),)
+
+
+def _read_only(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return ReadOnly(value)
+    return ReadOnlyList(map(_read_only, value)) if isinstance(value, list) else value

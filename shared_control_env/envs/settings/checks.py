@@ -13,7 +13,7 @@ from shared_control_env.core import parameters as core
 from shared_control_env.core.records import MAX_DELAY
 from shared_control_env.envs.degradations import NOISES
 from shared_control_env.envs.settings.changes import at
-from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings
+from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings, plain
 from shared_control_env.nearest import hint, nearest
 
 SHARES, TIMES = ("loss_of_effectiveness", "saturation"), ("delay",)
@@ -34,7 +34,11 @@ LARGEST_OFFSET = 20.0
 CUT_OFF = 3.0
 """Deviations at which log-normal draws are cut off."""
 
+WAYS_TO_DRAW = ({"low", "high"}, {"median", "spread"}, {"choices"})
+"""What an entry of ``randomise`` gives beside its setting."""
+
 NOT_DRAWN = (
+    *("simulation_frequency", "policy_frequency"),
     *("screen_width", "screen_height", "centering_position", "scaling"),
     *("offscreen_rendering", "real_time_rendering", "neighbour_vehicles_connected_lanes", "other_vehicles_type"),
     *("degradations", "randomise"),
@@ -51,7 +55,7 @@ def check(config: Mapping[str, Any]) -> Settings:
     settings = _validated(config)
     _check_time(settings)
     _check_faults(settings)
-    _check_random(settings, config)
+    _check_random(settings)
     _check_road(settings)
     _check_places(settings)
     _check_vehicle(settings)
@@ -165,8 +169,10 @@ def _refuse_idle(name: str, section: BaseModel, field: str, heeded: bool, reason
         raise ValueError(f"{name}[{field!r}] = {value!r} would not act: {reason}")
 
 
-def _check_random(settings: Settings, config: Mapping[str, Any]) -> None:
-    """Paths that name a number, and something within its range to draw from."""
+def _check_random(settings: Settings) -> None:
+    """Paths that name a number, each once, and something within its range to draw from."""
+    config = plain(settings)
+    seen: dict[str, int] = {}
     for i, entry in enumerate(settings.randomise):
         name = f"config['randomise'][{i}]"
         path = tuple(entry.setting.split("."))
@@ -174,14 +180,16 @@ def _check_random(settings: Settings, config: Mapping[str, Any]) -> None:
             present = at(config, path)
         except ValueError as error:
             raise ValueError(f"{name}['setting'] = {entry.setting!r}: {error}") from None
-        if path[0] in NOT_DRAWN:
-            raise ValueError(f"{name}['setting'] = {entry.setting!r} is the same in all episodes; it cannot be drawn")
+        if entry.setting in seen:
+            raise ValueError(f"{name} draws {entry.setting!r}, as entry {seen[entry.setting]} does; leave one out")
+        seen[entry.setting] = i
+        if path[0] in NOT_DRAWN or path[-1] == "seed":
+            raise ValueError(f"{name}['setting'] = {entry.setting!r} cannot be drawn")
         if isinstance(present, bool | str | list | Mapping):
             raise ValueError(f"{name}['setting'] = {entry.setting!r} is no number, so that it cannot be drawn")
-        uniform = entry.low is not None and entry.high is not None and entry.low <= entry.high
-        log_normal = entry.median is not None and entry.spread is not None
-        if [uniform, log_normal, bool(entry.choices)].count(True) != 1:
-            given = entry.model_dump(exclude_none=True)
+        given = entry.model_dump(exclude_none=True)
+        del given["setting"]
+        if set(given) not in WAYS_TO_DRAW or given.get("low", 0.0) > given.get("high", math.inf):
             raise ValueError(f"{name} = {given} must have either low <= high, or median and spread, or choices")
         for value in ends_of(entry):
             try:
@@ -297,12 +305,17 @@ def _check_idle(settings: Settings) -> None:
     _refuse_idle(name, risk, "sigma_x", risk.preset == "paper", "it is of the preset 'paper'")
     for field in ("w_f_change", "w_l_change", "w_p_change"):
         _refuse_idle(name, risk, field, settings.lane_change is not None, "there is no config['lane_change']")
+    if settings.lane_change is not None and settings.lane_change.lane == settings.ego.lane:
+        lane = settings.ego.lane
+        raise ValueError(f"config['lane_change']['lane'] = {lane} would not act: the ego is in that lane")
     for field in ("K_h", "T_h"):
         model = settings.internal_model
         _refuse_idle(
             "config['internal_model']", model, field, model.active, "the driver has no internal model (active)"
         )
-    person = settings.person
+    person, longest = settings.person, (MAX_DELAY - 1) / settings.policy_frequency
+    if person.delay > longest:
+        raise ValueError(f"config['person']['delay'] = {person.delay} s must lie in [0, {longest:g}] at this frequency")
     for field in type(person).model_fields:
         _refuse_idle("config['person']", person, field, field == "active" or person.active, "there is no person")
     for field in ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "response"):

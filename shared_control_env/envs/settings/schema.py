@@ -23,6 +23,9 @@ from shared_control_env.envs.degradations import DEGRADATIONS
 OWN_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
 """Traffic that the core drives, by its plans."""
 
+LONGEST = 3600.0
+"""Longest duration that can be set [s]: an hour."""
+
 PANEL_HEIGHT = 192
 """Height of the gauges' panel in pictures [px]."""
 
@@ -34,6 +37,9 @@ def _whole(value: Any) -> Any:
 
 Lane = Annotated[int, Interval(ge=0, lt=core.MOST_LANES), BeforeValidator(_whole)]
 """Number of a lane; 0 is the rightmost."""
+
+Onset = Annotated[float, Interval(ge=0.0, le=LONGEST)]
+"""When something sets in [s]."""
 
 Seed = Annotated[int, Interval(ge=0, lt=2**63), BeforeValidator(_whole)]
 """Seed of noise; the core keeps it in 64 bits."""
@@ -91,14 +97,14 @@ class EgoSettings(Section):
 class BrakeSettings(Section):
     """Braking to a stop."""
 
-    onset: NonNegative  # [s]
+    onset: Onset  # [s]
     deceleration: Annotated[float, Interval(gt=0.0, le=20.0)]  # [m/s^2]
 
 
 class LaneChangeSettings(Section):
     """A move over to another lane (core.lane_change)."""
 
-    onset: NonNegative  # [s]
+    onset: Onset  # [s]
     duration: Annotated[float, Interval(ge=0.1, le=100.0)] = 4.0  # [s]
     lane: Lane
 
@@ -120,11 +126,11 @@ class FaultSettings(Section):
 
     kind: Literal[KINDS[1:]] = "bias"
     channel: Literal["acceleration", "steering", "both"] = "steering"
-    onset: NonNegative  # [s]
+    onset: Onset  # [s]
     ramp: NonNegative = 0.0  # [s]
     duration: Positive | None = None  # [s]; None for a permanent one
     period: NonNegative = 0.0  # of one that comes and goes [s]; 0 for one that stays
-    duty: Fraction = 0.5  # share of the period in which it is there
+    duty: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.5  # share of the period in which it is there
     size: float | None = None
     time_constant: Annotated[float, Interval(ge=1e-3, le=1e3)] = 0.5  # of coloured noise [s]
     frequency: Annotated[float, Interval(gt=0.0, le=1e3)] = 0.5  # of an oscillation [Hz]
@@ -139,7 +145,7 @@ class RandomSettings(Section):
     high: float | None = None
     median: Positive | None = None  # of a log-normal one, cut off at 3 deviations
     spread: Annotated[float, Interval(ge=0.0, le=2.0)] | None = None  # standard deviation of its logarithm [-]
-    choices: Annotated[list[float], MaxLen(10_000)] | None = None
+    choices: Annotated[list[float], MinLen(1), MaxLen(10_000)] | None = None
 
 
 class AuthoritySettings(Section):
@@ -166,7 +172,7 @@ class SolverSettings(Section):
 
 
 _TASK_FROM_ROAD = (
-    *("dt", "lane_width", "road_low", "road_high", "road_end", "y_target", "y_goal"),
+    *("dt", "lane_width", "road_high", "road_end", "y_target", "y_goal"),
     *("change_onset", "change_duration"),
 )
 _Longitudinal = _section(
@@ -182,7 +188,7 @@ _Automation = _section("_Automation", core.PredictiveParameters)
 _Driver = _section("_Driver", core.PredictiveParameters, "R")  # the driver's cost has no potential field
 _SafeArea = _section("_SafeArea", core.SafeAreaParameters)
 _Lateral = _section("_Lateral", core.LateralRiskParameters)
-_Law = _section("_Law", core.LawParameters, "strict")
+_Law = _section("_Law", core.LawParameters)
 _Lag = _section("_Lag", core.DriverLagParameters)
 _Reward = _section("_Reward", core.RewardParameters)
 _Person = _section("_Person", core.PersonParameters, "seed", seed=(Seed | None, None))  # None to have it drawn
@@ -202,7 +208,7 @@ class Settings(Section):
     real_time_rendering: bool = False
     neighbour_vehicles_connected_lanes: bool = True
 
-    duration: Annotated[float, Interval(gt=0.0, le=3600.0)] = 10.0  # [s]
+    duration: Annotated[float, Interval(gt=0.0, le=LONGEST)] = 10.0  # [s]
     road: RoadSettings = RoadSettings()
     ego: EgoSettings = EgoSettings()
     lane_change: LaneChangeSettings | None = None  # of the ego; None to keep the lane
@@ -232,6 +238,11 @@ class Settings(Section):
     def steps(self) -> int:
         """Length of an episode in decisions."""
         return round(self.duration * self.policy_frequency)
+
+    @property
+    def has_person(self) -> bool:
+        """Whether the predictive driver is a person."""
+        return self.person.active
 
     @property
     def road_length(self) -> float:

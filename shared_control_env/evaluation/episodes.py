@@ -277,7 +277,7 @@ class Policies:
                 checked_command(driver.act(observation, scene), self._names[0])
                 for driver, observation, scene in zip(self._drivers, observations, self._scenes, strict=True)
             ]
-            action[DRIVER] = np.array(commands) / self._limits
+            action[DRIVER] = np.clip(np.array(commands) / self._limits, -1.0, 1.0)
         if self._allocators:
             alphas = [
                 checked_authority(a.allocate(scene, signals), self._names[1])

@@ -8,12 +8,12 @@ on, lasts for a duration, and may come and go.
 
 from __future__ import annotations
 
-from math import exp, floor, pi, sin, sqrt
+from math import floor, pi, sin
 
 import numpy as np
 
 from shared_control_env.core.jit import jit
-from shared_control_env.core.noise import standard_normal
+from shared_control_env.core.noise import coloured, standard_normal
 from shared_control_env.core.parameters import DegradationParameters, Limits
 from shared_control_env.core.records import MAX_DELAY, Record
 
@@ -118,7 +118,7 @@ def degrade_channel(
         delay                  u of the time t - g size           size [s]
         white_noise            u + g size n_k                     size: standard deviation [m/s^2 or rad]
         coloured_noise         u + g size x_k                     the same, of a first-order process:
-                               x_k = phi x_k-1 + sqrt(1 - phi^2) n_k,  phi = exp(-dt / time_constant)
+                               :func:`core.noise.coloured`
         oscillation            u + g size sin(2 pi frequency (t - onset))
         drop_out               0
         sign_error             -u
@@ -170,7 +170,6 @@ def degrade_channel(
 @jit
 def _remember(fault: DegradationParameters, memory: Record, u: np.ndarray, acting: bool, k: int, dt: float) -> None:
     """Keep what a later step of a degradation needs of the present command u, shape (2,)."""
-    phi = exp(-dt / fault.time_constant)
     for channel in range(2):
         memory.past[k % MAX_DELAY, channel] = u[channel]
         if fault.kind == STUCK and acting and not memory.acting:
@@ -178,8 +177,8 @@ def _remember(fault: DegradationParameters, memory: Record, u: np.ndarray, actin
         if not acting:
             memory.last[channel] = u[channel]
         if fault.kind == COLOURED_NOISE:
-            n = standard_normal(fault.seed, 2 * k + channel)
-            memory.kept[channel] = n if k == 0 else phi * memory.kept[channel] + sqrt(1.0 - phi * phi) * n
+            kept = memory.kept[channel]
+            memory.kept[channel] = coloured(kept, fault.seed, 2 * k + channel, k, fault.time_constant, dt)
     memory.acting = acting
 
 

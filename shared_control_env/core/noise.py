@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, log, pi, sqrt
+from math import cos, exp, log, pi, sqrt
 
 import numpy as np
 
@@ -32,3 +32,25 @@ def standard_normal(seed: int, counter: int) -> float:
     """A standard normal number by Box & Muller's transform of the entries 2 counter and 2 counter + 1."""
     radius = sqrt(-2.0 * log(1.0 - uniform(seed, 2 * counter)))
     return radius * cos(2.0 * pi * uniform(seed, 2 * counter + 1))
+
+
+@jit
+def coloured(previous: float, seed: int, counter: int, k: int, time_constant: float, dt: float) -> float:
+    """x_k of a stationary first-order process of unit variance.
+
+    ::
+
+        x_0 = n_0,   x_k = phi x_k-1 + sqrt(1 - phi^2) n_k,   phi = exp(-dt / time_constant)
+
+    Args:
+        previous: x_k-1; not used at k = 0.
+        seed, counter: of n_k, see :func:`standard_normal`.
+        k: step.
+        time_constant: of the process [s].
+        dt: time step [s].
+    """
+    n = standard_normal(seed, counter)
+    if k == 0:
+        return n
+    phi = exp(-dt / time_constant)
+    return phi * previous + sqrt(1.0 - phi * phi) * n

@@ -7,14 +7,14 @@ proportion to what it does. The numbers and their sources are in :class:`core.pa
 
 from __future__ import annotations
 
-from math import cos, exp, sin, sqrt
+from math import cos, exp, sin
 
 import numpy as np
 
 from shared_control_env.core.dynamics import PSI, V_X, Y, implicit_step
 from shared_control_env.core.jit import jit, jit_inlined
 from shared_control_env.core.longitudinal_risk import PRECEDING
-from shared_control_env.core.noise import standard_normal
+from shared_control_env.core.noise import coloured, standard_normal
 from shared_control_env.core.parameters import TRAFFIC_BODY, Parameters
 from shared_control_env.core.records import MAX_DELAY, NEAR_S, PRESENT, Record
 
@@ -51,10 +51,8 @@ def clear_person(memory: Record, p: Parameters) -> None:
 @jit
 def advance_errors(memory: Record, k: int, p: Parameters) -> None:
     """Errors of perception and arm, each a first-order process of unit variance and the person's noise time."""
-    phi = exp(-p.task.dt / p.person.noise_time)
     for i in range(4):
-        n = standard_normal(p.person.seed, 4 * k + i)
-        memory.error[i] = n if k == 0 else phi * memory.error[i] + sqrt(1.0 - phi * phi) * n
+        memory.error[i] = coloured(memory.error[i], p.person.seed, 4 * k + i, k, p.person.noise_time, p.task.dt)
 
 
 @jit

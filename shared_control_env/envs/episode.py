@@ -10,6 +10,7 @@ import numpy as np
 from shared_control_env.core.parameters import Limits
 from shared_control_env.envs.degradations import NOISES, draw_degradation
 from shared_control_env.envs.settings import CUT_OFF, RandomSettings, Settings, check, plain
+from shared_control_env.envs.settings.changes import at
 
 
 def is_random(settings: Settings) -> bool:
@@ -64,9 +65,7 @@ def _concerns_driver(entry: RandomSettings) -> bool:
 def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.Generator) -> None:
     """Draw one setting of a plain dict; whole numbers, both ends included, where it is a whole number."""
     *path, last = entry.setting.split(".")
-    section: Any = config
-    for key in path:
-        section = section[int(key)] if isinstance(section, list) else section[key]
+    section = at(config, tuple(path))
     place: Any = int(last) if isinstance(section, list) else last
     if entry.choices:
         section[place] = entry.choices[int(rng.integers(len(entry.choices)))]

@@ -58,21 +58,17 @@ def entries_of(folder: Path, driver: str, authority: str) -> tuple[DriverEntry, 
         warnings.warn(f"{folder} holds results of {manifest['versions']}; now it is {versions()}", stacklevel=2)
     first = choose_one("driver", driver, manifest["drivers"])
     second = choose_one("authority", authority, manifest["authorities"])
-    entries = (
-        DRIVERS.get(driver) if first["origin"] == "catalogue" else None,
-        AUTHORITIES.get(authority) if second["origin"] == "catalogue" else None,
-    )
-    own_driver = (
-        DriverEntry("given by the user", _make("driver", driver, first), first["config"], draws=tuple(first["draws"]))
-        if entries[0] is None
-        else entries[0]
-    )
-    own_authority = (
-        AuthorityEntry("given by the user", second["law"], _make("authority", authority, second))
-        if entries[1] is None
-        else entries[1]
-    )
-    return own_driver, own_authority, manifest["config"]
+    if first["origin"] == "catalogue":
+        driver_entry = choose_one("driver", driver, DRIVERS)
+    else:
+        make, draws = _make("driver", driver, first), tuple(first["draws"])
+        driver_entry = DriverEntry("given by the user", make, first["config"], draws=draws)
+    if second["origin"] == "catalogue":
+        authority_entry = choose_one("authority", authority, AUTHORITIES)
+    else:
+        make = _make("authority", authority, second)
+        authority_entry = AuthorityEntry("given by the user", second["law"], make)
+    return driver_entry, authority_entry, manifest["config"]
 
 
 def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:

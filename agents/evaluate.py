@@ -20,8 +20,8 @@ from scipy import stats
 from agents.drivers import authority_entry, driver_entry, shipped
 from agents.policy import Policy
 from agents.tasks import HELD_OUT_DEGRADATIONS, HELD_OUT_SEED, TASKS
-from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.evaluation import Suite, evaluate
 from shared_control_env.evaluation.catalogue import choose
 from shared_control_env.evaluation.statistics import COVERAGE, Interval, intervals
@@ -85,7 +85,7 @@ def measure(
     Args:
         task: key of :data:`agents.tasks.TASKS`.
         sources: the trained ones, as :func:`agents.drivers.driver_entry` takes them.
-        scenarios: keys of :data:`envs.cases.CASES`.
+        scenarios: keys of :data:`envs.scenarios.SCENARIOS`.
         seeds: how many of each degradation, from :data:`agents.tasks.HELD_OUT_SEED` on.
         jobs: processes.
         progress: called with the number of episodes done and of all.
@@ -243,7 +243,7 @@ def main(
         if not chosen:
             raise ValueError(f"no policy of the task {task!r} ships; name files")
         names = [name.strip() for name in scenarios.split(",")] if scenarios else scenarios_of(chosen, task)
-        choose("scenario", names, CASES)
+        choose("scenario", names, SCENARIOS)
         table = measure_and_show(console, task, chosen, names, seeds, jobs)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None

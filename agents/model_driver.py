@@ -9,7 +9,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.save_util import load_from_zip_file
 
-from shared_control_env.core.observation import FEATURES
+from shared_control_env.core.feedback.observation import DRIVER_V0
 from shared_control_env.core.parameters import Limits
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
@@ -29,10 +29,10 @@ class ModelDriver:
 
     def __init__(self, model: BaseAlgorithm, limits: Limits | None = None) -> None:
         shapes = model.observation_space.shape, model.action_space.shape
-        if shapes != ((len(FEATURES),), (2,)):
+        if shapes != ((DRIVER_V0.size,), (2,)):
             raise ValueError(
                 f"the model maps observations of shape {shapes[0]} to actions of shape {shapes[1]}; a driver maps "
-                f"{(len(FEATURES),)} to (2,); policies of agents.train are read from their best.npz"
+                f"{(DRIVER_V0.size,)} to (2,); policies of agents.train are read from their best.npz"
             )
         self._model, self._limits = model, np.array(limits or Limits())
 

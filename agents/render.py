@@ -13,8 +13,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from agents.drivers import authority_entry, driver_entry
-from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.evaluation.catalogue import choose
 from shared_control_env.evaluation.replay import record, replay_episode
 
@@ -38,7 +38,7 @@ def drive(scenario: str, degradation: str, seed: int, driver: str, authority: st
     """Run one episode.
 
     Args:
-        scenario: key of :data:`envs.cases.CASES`.
+        scenario: key of :data:`envs.scenarios.SCENARIOS`.
         degradation: key of :data:`envs.degradations.DEGRADATIONS`.
         seed: of the episode.
         driver: as :func:`agents.drivers.driver_entry` takes it.
@@ -103,7 +103,7 @@ def main(
         raise typer.BadParameter(f"out = {path} must end with .mp4")
     pairs = [pair.strip().partition(":") for pair in drivers.split(",")]
     try:
-        choose("scenario", scenario, CASES)
+        choose("scenario", scenario, SCENARIOS)
         choose("degradation", degradation, DEGRADATIONS)
         if path.exists():
             raise ValueError(f"{path} exists already; remove it, or choose another --out")

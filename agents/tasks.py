@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from shared_control_env.core.parameters import RewardParameters
-from shared_control_env.envs.cases import CASES
-from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.envs.scenarios import DRAWN_V0, SCENARIOS
 from shared_control_env.registration import ENVIRONMENTS
 
 # An effort of 9 % of the limits counts as much as a lateral error of 0.1 m, or a speed error of 0.2 m/s. Progress
 # counts next to nothing: with more a driver learns to push against an automation that is right to slow down. A
 # failure, discounted by 0.98 a step, outweighs braking hard for as long as it takes, and a last metre kept for safety.
-_REWARD = RewardParameters(progress=0.01, lane=4.0, speed=0.8, effort=1.3, comfort=0.005, conflict=0.01, failure=800.0)
+_REWARD = {
+    "progress": 0.01,
+    "lane": 4.0,
+    "speed": 0.8,
+    "effort": 1.3,
+    "comfort": 0.005,
+    "conflict": 0.01,
+    "failure": 800.0,
+}
 
 # The predictive driver leaves the lane more often than it collides, and an allocator can only choose how much it has to
 # do: more for the lane, less for the effort, and less for a failure, which is seldom the allocator's doing.
-_ALLOCATOR_REWARD = _REWARD._replace(lane=8.0, effort=0.4, failure=600.0)
+_ALLOCATOR_REWARD = {**_REWARD, "lane": 8.0, "effort": 0.4, "failure": 600.0}
 
 
 def _lag(gains: tuple[float, float], times: tuple[float, float]) -> tuple[dict[str, Any], ...]:
@@ -30,12 +36,12 @@ class Task(NamedTuple):
 
     Attributes:
         description: in a line.
-        reward: weights of the terms of :mod:`core.reward`.
+        reward: weights of the terms of :mod:`core.feedback.reward`.
         lag: draws of the driver's response.
     """
 
     description: str
-    reward: RewardParameters
+    reward: dict[str, float]
     lag: tuple[dict[str, Any], ...]
 
 
@@ -52,6 +58,9 @@ TASKS = {
 
 HELD_OUT_DEGRADATIONS = ("intermittent", "delay", "coloured_noise", "sign_error")
 """Degradations left out of training."""
+
+TRAINED_DEGRADATIONS = tuple(name for name in ("none", *DRAWN_V0) if name not in HELD_OUT_DEGRADATIONS)
+"""Degradations of training: none, and those of version 0 of the environments but for what is held out."""
 
 VALIDATION_SEED = 900_000
 """Training uses seeds below; from here on the best policy is chosen."""
@@ -70,7 +79,7 @@ def training_config(id: str, task: str) -> dict[str, Any]:
     return {
         "authority": {"law": "proportional"},
         "faults": [],
-        "degradations": [name for name in DEGRADATIONS if name not in HELD_OUT_DEGRADATIONS],
-        "randomise": [*CASES[ENVIRONMENTS[id]].settings.get("randomise", []), *TASKS[task].lag],
-        "reward": TASKS[task].reward._asdict(),
+        "degradations": list(TRAINED_DEGRADATIONS),
+        "randomise": [*SCENARIOS[ENVIRONMENTS[id]].settings.get("randomise", []), *TASKS[task].lag],
+        "reward": dict(TASKS[task].reward),
     }

@@ -12,16 +12,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.controllers.lead import VEHICLE_LENGTH
-from shared_control_env.core.observation import FEATURES
-from shared_control_env.core.parameters import Limits
+from shared_control_env.core.feedback.observation import DRIVER_V0
+from shared_control_env.core.parameters import TRAFFIC_BODY, Limits, VehicleParameters
 from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT
 
 _LIMITS = Limits()
 
-_PRESENT, _DISTANCE, _, _SPEED = (i for i, (name, _) in enumerate(FEATURES) if name.startswith("preceding"))
+FEATURES = DRIVER_V0.features
+"""Name and scale of every entry of the environment's observation."""
 
-_FAR = FEATURES[_DISTANCE][1] - VEHICLE_LENGTH
+_PRESENT = DRIVER_V0.place_of("preceding present [-]")
+_DISTANCE = DRIVER_V0.place_of("preceding distance along the road [m]")
+_SPEED = DRIVER_V0.place_of("preceding speed minus the ego's [m/s]")
+
+_BODIES = 0.5 * (VehicleParameters().length + TRAFFIC_BODY[0])
+"""What the distance of the centres has to be less for the gap [m]."""
+
+_FAR = FEATURES[_DISTANCE][1] - _BODIES
 """Largest gap that the observation tells from others [m]."""
 
 _NEAR = 0.1
@@ -38,7 +45,7 @@ DRIVER_FEATURES: tuple[tuple[str, float], ...] = (
 """Name and scale of every entry: the environment's observation, what is felt, and what is seen of the one ahead."""
 
 ALLOCATOR_FEATURES: tuple[tuple[str, float], ...] = (
-    *FEATURES[:7],  # the ego's motion, and the curvature where it is
+    *FEATURES[: DRIVER_V0.place_of("curvature 10 m ahead [1/m]")],  # the ego's motion, and the curvature where it is
     ("automation's last actual acceleration [m/s^2]", _LIMITS.a_max),
     ("automation's last actual steering [rad]", _LIMITS.delta_max),
     ("automation's degraded acceleration u_a,f [m/s^2]", _LIMITS.a_max),
@@ -46,7 +53,7 @@ ALLOCATOR_FEATURES: tuple[tuple[str, float], ...] = (
     ("predicted lateral error [m]", 4.0),
     ("longitudinal risk r_x [-]", 1.0),
     ("lateral risk r_y [-]", 1.0),
-    *FEATURES[10:22],  # the follower, the leader and the preceding vehicle
+    *(each for each in FEATURES if each[0].startswith(("follower", "leader", "preceding"))),
 )
 """Name and scale of every entry: the entry is the feature divided by its scale, clipped to [-1, 1]."""
 
@@ -70,14 +77,14 @@ def driver_view(observations: np.ndarray, felt: np.ndarray) -> np.ndarray:
         a that avoids   = max(0, v - v_p)^2 / (2 gap), if the one ahead keeps its speed
 
     Args:
-        observations: of the environment, shape (..., 25).
+        observations: of the environment, of :data:`DRIVER_V0`, shape (..., n).
         felt: u_a,act of the step before, a scene's ``felt`` [m/s^2, rad], shape (..., 2).
 
     Returns:
-        float32, shape (..., 30).
+        float32, shape (..., n + 5).
     """
     present = observations[..., _PRESENT] > 0.0
-    gap = FEATURES[_DISTANCE][1] * observations[..., _DISTANCE] - VEHICLE_LENGTH
+    gap = FEATURES[_DISTANCE][1] * observations[..., _DISTANCE] - _BODIES
     gap = np.where(present, np.maximum(gap, _NEAR), _FAR)
     closing = np.where(present, -FEATURES[_SPEED][1] * observations[..., _SPEED], 0.0)
     needed = np.maximum(closing, 0.0) ** 2 / (2.0 * gap)

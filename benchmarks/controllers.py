@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
 from scipy.optimize import minimize
 
 from benchmarks.timing import Timing, time_block
-from shared_control_env.core import single
-from shared_control_env.core.condensing import WORKSPACE
+from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.control.automation import cost, solve
+from shared_control_env.core.control.condensing import WORKSPACE
 from shared_control_env.core.records import MAX_CONTROL
 from shared_control_env.wrappers import DriverModel
+
+
+@jit
+def solve_automation(
+    U: np.ndarray, scene: Any, parameters: Any, iterations: int, work: Any
+) -> tuple[int, int, float, float]:
+    """:func:`core.control.automation.solve`, records as 0-d arrays."""
+    return solve(U, scene[()], parameters[()], iterations, work[()])
+
+
+@jit
+def automation_cost(U: np.ndarray, scene: Any, parameters: Any, work: Any) -> float:
+    """:func:`core.control.automation.cost`, records as 0-d arrays."""
+    return cost(U, scene[()], parameters[()], work[()])
 
 
 class Gaps(NamedTuple):
@@ -58,18 +73,18 @@ def automation(found: list[np.ndarray], repeats: int) -> tuple[Timing, Timing, G
     def ours() -> int:
         for scene in found:
             U[:] = 0.0
-            single.solve_automation(U, scene, parameters, 2, work)
+            solve_automation(U, scene, parameters, 2, work)
         return len(found)
 
     def slsqp(scene: np.ndarray) -> float:
         trial = np.zeros((MAX_CONTROL, 2))
 
-        def cost(x: np.ndarray) -> float:
+        def cost_of(x: np.ndarray) -> float:
             trial[:H_c] = x.reshape(H_c, 2) * scale
-            return single.automation_cost(trial, scene, parameters, work)
+            return automation_cost(trial, scene, parameters, work)
 
         bounds = [(-1.0, 1.0)] * (2 * H_c)
-        return minimize(cost, np.zeros(2 * H_c), method="SLSQP", bounds=bounds, options={"ftol": 1e-10}).fun
+        return minimize(cost_of, np.zeros(2 * H_c), method="SLSQP", bounds=bounds, options={"ftol": 1e-10}).fun
 
     some = found[:: max(1, len(found) // 40)]
 
@@ -81,16 +96,16 @@ def automation(found: list[np.ndarray], repeats: int) -> tuple[Timing, Timing, G
     cold, warm = [], []
     for before, scene in zip(found[:-1], found[1:], strict=True):
         U[:] = 0.0
-        best = single.solve_automation(U, scene, parameters, 200, work)[3]
+        best = solve_automation(U, scene, parameters, 200, work)[3]
         U[:] = 0.0
-        first = int(parameters["authority"]["first_iterations"])
-        value = single.solve_automation(U, scene, parameters, first, work)[3]
+        first = int(parameters["solver"]["first_iterations"])
+        value = solve_automation(U, scene, parameters, first, work)[3]
         cold.append((value - best) / max(best, 1e-6))
         if scene["k"] > 0:
             U[:] = 0.0
-            single.solve_automation(U, before, parameters, 200, work)
+            solve_automation(U, before, parameters, 200, work)
             U[: H_c - 1] = U[1:H_c]
-            value = single.solve_automation(U, scene, parameters, int(parameters["authority"]["iterations"]), work)[3]
+            value = solve_automation(U, scene, parameters, int(parameters["solver"]["iterations"]), work)[3]
             warm.append((value - best) / max(best, 1e-6))
     gaps = Gaps(float(np.percentile(cold, 95)), float(np.percentile(warm, 95)))
     return time_block(ours, repeats), time_block(theirs, max(3, repeats // 5)), gaps

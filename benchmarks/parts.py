@@ -10,27 +10,28 @@ import numpy as np
 from numba import njit
 
 from benchmarks.timing import Timing, time_block
-from shared_control_env.core import (
-    assessment,
-    automation_mpc,
-    driver_qp,
-    dynamics,
-    fuzzy,
-    observation,
-)
-from shared_control_env.core import scene as scenes
-from shared_control_env.core.active_set_qp import solve_qp
-from shared_control_env.vector.kernel import search, triangulate
-from shared_control_env.vector.records import PROGRAM, WORKSPACE, Batch, Setup
+from shared_control_env.core.authority import fuzzy
+from shared_control_env.core.batch import WORK, Batch, Setup
+from shared_control_env.core.control import automation as automation_mpc
+from shared_control_env.core.control import driver as driver_qp
+from shared_control_env.core.control.predictive_driver import PROGRAM
+from shared_control_env.core.control.qp.active_set import solve_qp
+from shared_control_env.core.feedback import observation
+from shared_control_env.core.risk import assessment
+from shared_control_env.core.risk.finding import SEARCH, TRIANGULATE
+from shared_control_env.core.world import scene as scenes
+from shared_control_env.core.world import vehicle as dynamics
+
+triangulate, search = TRIANGULATE.call, SEARCH.call
 
 N = 256
-"""Situations in one loop."""
+"""Environments in one loop."""
 
 
 @njit
 def _automation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
-        automation_mpc.solve(batch.automations[i].U, batch.scenes[i], batch.parameters[i], 2, works[0].solver)
+        automation_mpc.solve(batch.automations[i].U, batch.scenes[i], batch.parameters[i], 2, works[0].condensing)
 
 
 @njit
@@ -42,15 +43,15 @@ def _perception(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndar
 
 @njit
 def _triangulation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
-    work = works[0]
+    finding = works[0].finding
     for i in range(batch.scenes.shape[0]):
         scene = batch.scenes[i]
         s = scene.region[0] + 0.5 * (scene.region[1] - scene.region[0])
         for n in range(4):
-            work.corners[0, n, 0] = s + (2.5 if n < 2 else -2.5)
-            work.corners[0, n, 1] = scene.region[3] + (0.7 if n == 0 or n == 3 else -0.6)
-        n = triangulate(setup.solvers.triangulate, scene, 1, work)
-        search(setup.solvers.search, scene, batch.parameters[i], n, work)
+            finding.corners[0, n, 0] = s + (2.5 if n < 2 else -2.5)
+            finding.corners[0, n, 1] = scene.region[3] + (0.7 if n == 0 or n == 3 else -0.6)
+        n = triangulate(setup.calls.triangulate, scene, 1, finding)
+        search(setup.calls.search, scene, batch.parameters[i], n, finding)
 
 
 @njit
@@ -74,9 +75,10 @@ def _dynamics(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarra
 
 @njit
 def _observation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
-    out = np.empty(25, dtype=np.float32)
+    out, calls = np.empty(setup.scales.shape[0], dtype=np.float32), setup.calls
     for i in range(batch.scenes.shape[0]):
-        observation.observe(batch.scenes[i], batch.memories[i], batch.lines[i], batch.parameters[i], out)
+        p, memory, line = batch.parameters[i], batch.memories[i], batch.lines[i]
+        observation.observe(calls.observe, setup.scales, batch.scenes[i], memory, line, p, out)
 
 
 @njit
@@ -89,7 +91,7 @@ def _driver(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray)
             batch.memories[i].u_h_des,
             batch.memories[i].u_h_act,
             p,
-            works[0].solver,
+            works[0].condensing,
             g.P,
             g.q,
             g.A,
@@ -131,6 +133,6 @@ def times(repeats: int) -> dict[str, Timing]:
         for _ in range(25):
             env.step(0.1 * rng.normal(size=(N, 2)).clip(-1, 1))
         batch, setup = env.unwrapped._batch, env.unwrapped._setup  # type: ignore[attr-defined]
-        run = partial(loop, batch, setup, np.zeros(1, WORKSPACE), np.zeros(1, PROGRAM))
+        run = partial(loop, batch, setup, np.zeros(1, WORK), np.zeros(1, PROGRAM))
         found[name] = time_block(partial(_anew, batch, batch.automations.copy(), batch.states.copy(), run), repeats)
     return found

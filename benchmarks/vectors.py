@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.environments import highway_config
 from benchmarks.timing import Timing, time_block
-from shared_control_env.vector.threads import cores
+from shared_control_env.core.compile.cold_start import cores
 
 SIZES = (1, 64, 1024, 4096)
 """Numbers of environments."""

@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 import shared_control_env  # noqa: F401  (registers the environments)
-from shared_control_env.core.authority import LAWS
+from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.wrappers import DriverModel
 
 SEED = 0
 """Seed of every run; the cases draw nothing at random, so that it changes nothing."""
 
-CASES = {1: "SharedControl/TwoLane-v0", 2: "SharedControl/Curve-v0"}
+SCENARIOS = {1: "SharedControl/TwoLane-v0", 2: "SharedControl/Curve-v0"}
 PRESETS = ("graded", "paper")
 
 SIGNAL_COLUMNS = {
@@ -83,13 +83,13 @@ class Run:
 
 def all_runs() -> list[Run]:
     """Both cases under all laws and both presets, and the degraded automation alone."""
-    runs = [Run(case, law, preset) for case in CASES for law in LAWS for preset in PRESETS]
-    return runs + [Run(case, "none", preset, driver=False) for case in CASES for preset in PRESETS]
+    runs = [Run(case, law, preset) for case in SCENARIOS for law in LAWS for preset in PRESETS]
+    return runs + [Run(case, "none", preset, driver=False) for case in SCENARIOS for preset in PRESETS]
 
 
 def make(run: Run, render_mode: str | None = None, **config: Any) -> gym.Env:
     """The paper's closed loop of a run: limiter and predictive driver bound."""
-    env = gym.make(CASES[run.case], config={**run.config, **config}, render_mode=render_mode)
+    env = gym.make(SCENARIOS[run.case], config={**run.config, **config}, render_mode=render_mode)
     return DriverModel(env)
 
 

@@ -17,9 +17,9 @@ import pandas as pd
 from scipy.stats import spearmanr
 
 from experiments.case_runs import Run
-from shared_control_env.core.fuzzy import authority
-from shared_control_env.core.longitudinal_risk import dynamic_field
+from shared_control_env.core.authority.fuzzy import authority
 from shared_control_env.core.parameters import Limits, LongitudinalRiskParameters, VehicleParameters
+from shared_control_env.core.risk.longitudinal import dynamic_field
 
 Runs = Mapping[Run, pd.DataFrame]
 

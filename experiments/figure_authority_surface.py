@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments import style
-from shared_control_env.core.fuzzy import OPERATORS, authority
+from shared_control_env.core.authority.fuzzy import OPERATORS, authority
 
 
 def draw(path: Path) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from experiments import style
 from experiments.case_runs import PRESETS
-from shared_control_env.core.longitudinal_risk import dynamic_field, pair_risk, safe_distance
 from shared_control_env.core.parameters import LongitudinalRiskParameters
+from shared_control_env.core.risk.longitudinal import dynamic_field, pair_risk, safe_distance
 
 V_OBSTACLE = 12.0
 """Speed of the obstacle [m/s], that of Case 1's preceding vehicle."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments import style
-from shared_control_env.core.fuzzy import AUTHORITY_TERMS, membership
+from shared_control_env.core.authority.fuzzy import AUTHORITY_TERMS, membership
 
 PANELS = (
     ("(a) lateral risk $r_y$", ("VS", "S", "M", "B", "VB")),

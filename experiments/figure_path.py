@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 
 from experiments import style
 from experiments.case_runs import Run, make
-from shared_control_env.core.road import point_at
+from shared_control_env.core.world.road import point_at
 
 EVERY = 25
 """Time steps between the drawn safe areas and predictions."""

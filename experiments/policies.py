@@ -133,7 +133,7 @@ def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
     return {
         "task": task,
         "description": TASKS[task].description,
-        "reward": ", ".join(f"{name} {value:g}" for name, value in TASKS[task].reward._asdict().items()),
+        "reward": ", ".join(f"{name} {value:g}" for name, value in TASKS[task].reward.items()),
         "lag": ", ".join(
             f"{draw['setting'].split('.')[-1]} {draw['low']} to {draw['high']}" for draw in TASKS[task].lag
         ),

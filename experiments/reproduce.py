@@ -27,7 +27,7 @@ from experiments import (
     figure_risk,
     video,
 )
-from experiments.case_runs import CASES, SEED, Run, all_runs, simulate
+from experiments.case_runs import SCENARIOS, SEED, Run, all_runs, simulate
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.storage import write_atomically
 
@@ -87,7 +87,7 @@ def figures(runs: dict[Run, pd.DataFrame], out: Path) -> dict[Path, Callable[[Pa
         out / "authority_surface.png": figure_authority_surface.draw,
         out / "dpf_surface.png": figure_dpf.draw,
     }
-    for case in CASES:
+    for case in SCENARIOS:
         for name, module in (("path", figure_path), ("risk", figure_risk), ("commands", figure_commands)):
             drawings[out / f"case{case}_{name}.png"] = partial(module.draw, runs, case)
     return drawings
@@ -129,7 +129,7 @@ def main(
             write_atomically(path, draw)
             progress.advance(task)
 
-        for case in CASES:
+        for case in SCENARIOS:
             path = out / f"case{case}.mp4"
             main_run = Run(case, "paper", "graded")
             task = progress.add_task(f"video of case {case}", total=len(runs[main_run]))

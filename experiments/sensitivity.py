@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import track
 
 from experiments import style
-from shared_control_env.core import fuzzy
+from shared_control_env.core.authority import fuzzy
 from shared_control_env.core.parameters import (
     DriverLagParameters,
     PredictiveParameters,

@@ -25,8 +25,8 @@ try:
 except ImportError:
     sys.exit('shared-control needs the extra "benchmark": pip install "shared_control_env[benchmark]"')
 
-from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose_one
 from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS
 from shared_control_env.evaluation.interrupt import resumable
@@ -175,7 +175,7 @@ def replay(
     console = Console()
     place = None if video is None else _checked_video(video)
     with _in_words(console):
-        case = choose_one("scenario", scenario, CASES)
+        case = choose_one("scenario", scenario, SCENARIOS)
         choose_one("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
         if source is None:
             first, second = choose_one("driver", driver, DRIVERS), choose_one("authority", authority, AUTHORITIES)
@@ -217,7 +217,7 @@ def list_all() -> None:
     """Print the names of scenarios, degradations, drivers, authorities, suites and metrics."""
     console = Console()
     for title, entries in (
-        ("scenarios", {name: f"{case.description} ({case.id})" for name, case in CASES.items()}),
+        ("scenarios", {name: f"{case.description} ({case.id})" for name, case in SCENARIOS.items()}),
         ("degradations", {name: entry.description if entry else "no fault" for name, entry in DEGRADATIONS.items()}),
         ("drivers", {name: driver.description for name, driver in DRIVERS.items()}),
         ("authorities", {name: authority.description for name, authority in AUTHORITIES.items()}),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core import single
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import SCENE, pack
-from shared_control_env.core.road import reference_line
-from shared_control_env.core.safe_area import triangulate
+from shared_control_env.core.risk.triangulation import triangulate_any
+from shared_control_env.core.world.road import reference_line
+from tests import compiled
 
 STRAIGHT = reference_line([(1000.0, 0.0)], lead_in=50.0)
 NO_HOLES = np.empty((0, 4, 2))
@@ -31,8 +31,8 @@ def scene_of(
     parameters = pack(Parameters()) if parameters is None else parameters
     scene = np.zeros((), SCENE)
     corners = np.zeros((len(others), 4, 2))
-    count = single.sense(k, state, others, line, parameters, scene, corners)
-    single.search(triangulate(*scene["region"].tolist(), corners[:count]), parameters, scene)
+    count = compiled.sense(k, state, others, line, parameters, scene, corners)
+    compiled.search(triangulate_any(scene["region"], corners[:count]), parameters, scene)
     return scene
 
 

@@ -36,7 +36,7 @@ def test_wheel_runs_from_a_read_only_folder(wheel, tmp_path):
         path.chmod(0o555 if path.is_dir() else 0o444)
     code = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from shared_control_env.core.road import wrap_angle\n"
+        "from shared_control_env.core.world.road import wrap_angle\n"
         "import shared_control_env\n"
         "assert shared_control_env.__file__.startswith(sys.argv[1])\n"
         "assert wrap_angle(4.0) < 0.0\n"

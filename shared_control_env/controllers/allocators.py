@@ -9,11 +9,18 @@ import numpy as np
 
 from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.lead import lead_of
+from shared_control_env.core.authority import allocators as compiled_allocators
+from shared_control_env.core.authority.fuzzy import OPERATORS, authority
+from shared_control_env.nearest import hint
 
 
 @runtime_checkable
 class Allocator(Protocol):
-    """Anything that decides how much authority the automation has."""
+    """Anything that decides how much authority the automation has.
+
+    One that the kernel runs too has an attribute ``compiled``: a function of scene, signals and parameters that numba
+    compiles (:data:`core.authority.allocators.ALLOCATE`), and that gives what ``allocate`` gives.
+    """
 
     def reset(self, seed: int | None = None) -> None:
         """Begin an episode.
@@ -53,11 +60,35 @@ def checked_authority(alpha_a: Any, who: str = "allocator") -> float:
     return array.item()
 
 
+class FuzzyAuthority:
+    """The paper's fuzzy inference, ``alpha_a = FIS(r_x, r_y)`` (Eq. 9).
+
+    Args:
+        operators: of :data:`core.authority.fuzzy.OPERATORS`.
+
+    Attributes:
+        compiled: for the kernel.
+    """
+
+    def __init__(self, operators: str = "product-sum") -> None:
+        if operators not in OPERATORS:
+            raise ValueError(f"operators = {operators!r}; {hint(operators, OPERATORS)}")
+        self.operators = operators
+        self.compiled = compiled_allocators.FUZZY[operators]
+
+    def reset(self, seed: int | None = None) -> None:
+        """Nothing is remembered."""
+
+    def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
+        """alpha_a of one step."""
+        return authority(float(signals["r_x"]), float(signals["r_y"]), OPERATORS.index(self.operators))
+
+
 class FixedAuthority:
     """The same authority always.
 
     Args:
-        alpha: it [-].
+        alpha: the authority [-].
     """
 
     def __init__(self, alpha: float = 0.5) -> None:

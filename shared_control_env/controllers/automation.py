@@ -8,8 +8,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from shared_control_env.controllers.solution import Solution
-from shared_control_env.core import automation_mpc, single
-from shared_control_env.core.condensing import WORKSPACE
+from shared_control_env.core import entries
+from shared_control_env.core.control.automation import AUTOMATE, FAILED, automate
+from shared_control_env.core.control.condensing import WORKSPACE
 from shared_control_env.core.records import AUTOMATION_MEMORY
 
 
@@ -52,7 +53,7 @@ class Automation:
 
     def reset(self) -> None:
         """Forget the last commands."""
-        single.clear_automation(self._memory)
+        entries.clear_automation(self._memory)
 
     def act(self, scene: np.ndarray) -> Solution:
         """Decide on one scene.
@@ -61,13 +62,15 @@ class Automation:
             scene: record of :data:`records.SCENE`, an array of no dimension; its safe area found.
 
         Returns:
-            The solution; ``status`` is one of :mod:`automation_mpc`'s, ``dual_residual`` the projected gradient.
+            The solution: ``status`` as in :mod:`core.control.automation`, ``dual_residual`` the projected gradient.
         """
         begin = perf_counter()
-        status, iterations, residual = single.automate(scene, self._parameters, self._memory, self._work)
+        status, iterations, residual = entries.automate(
+            AUTOMATE.address(automate), scene, self._parameters, self._memory, self._work
+        )
         return Solution(
             command=self._memory["u_a_des"].copy(),
-            found=status != automation_mpc.FAILED,
+            found=status != FAILED,
             status=status,
             iterations=iterations,
             primal_residual=0.0,

@@ -12,8 +12,8 @@ from scipy import sparse
 
 from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.solution import Solution
-from shared_control_env.core import single
-from shared_control_env.core.condensing import WORKSPACE
+from shared_control_env.core import entries
+from shared_control_env.core.control.condensing import WORKSPACE
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import PERSON_MEMORY, SCENE, pack
 
@@ -41,7 +41,8 @@ class Driver(Protocol):
         """Decide on the desired command of one step.
 
         Args:
-            observation: what a driver perceives, as :data:`core.observation.FEATURES`, shape (25,).
+            observation: what the environment gives to see, by default
+                :data:`core.feedback.observation.DRIVER_V0`, shape (n,).
             scene: the same step in SI units, a record of :data:`core.records.SCENE`, such as ``scene["z"]``.
 
         Returns:
@@ -73,7 +74,7 @@ class PredictiveDriver:
     """The driver of Eq. 14-15: the automation's costs without the potential field, linearised, in OSQP.
 
     With ``parameters.internal_model.active`` it knows its own response and feels the automation's command
-    (:mod:`core.driver_qp`); the paper's does not.
+    (:mod:`core.control.driver`); the paper's does not.
 
     The workspace is set up at every reset, so that episodes do not depend on those before, and updated in
     place at every step; anew after :data:`KEPT` steps. Where OSQP does not solve to tolerance the last feasible command
@@ -121,7 +122,7 @@ class PredictiveDriver:
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired command u_h,des; see :class:`Driver`."""
         if scene["k"] > 0:  # what the arm gives now, after a step under its last command
-            single.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
+            entries.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
         self.solution = self.solve(scene)
         return self.solution.command
 
@@ -135,7 +136,7 @@ class PredictiveDriver:
             The solution.
         """
         begin = perf_counter()
-        single.build_program(
+        entries.build_program(
             scene, self._last, self._arm, self._parameters, self._work, self.P, self.q, self.A, self.low, self.high
         )
         result = self._solved()
@@ -196,7 +197,7 @@ class PredictiveDriver:
 
 
 class PersonDriver(PredictiveDriver):
-    """The predictive driver behind a person's eyes, attention and arm (:mod:`core.person`), as in the kernel.
+    """The predictive driver behind a person's eyes, attention and arm (:mod:`core.control.person`), as in the kernel.
 
     Args:
         parameters: the environment's parameters, ``parameters.person.active`` among them.
@@ -220,18 +221,18 @@ class PersonDriver(PredictiveDriver):
         """Begin an episode; what is random in the person comes from ``parameters.person.seed``."""
         super().reset(seed)
         self._total = np.zeros(2)
-        single.clear_person(self.person, self._parameters)
+        entries.clear_person(self.person, self._parameters)
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired command u_h,des of the person; see :class:`Driver`."""
         if scene["k"] > 0:
             self._total = np.clip(scene["felt"] + self._arm, -self._bounds, self._bounds)  # that drove the last step
-            single.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
+            entries.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
         self._seen[()] = scene
-        if single.take_in(scene, self._total, float(observation[-1]), self.person, self._parameters, self._seen):
+        if entries.take_in(scene, self._total, self.person, self._parameters, self._seen):
             self.solution = self.solve(self._seen)
             self._last = self.solution.command.copy()
-            single.with_arm_noise(self._last, self.person, self._parameters)
+            entries.with_arm_noise(self._last, self.person, self._parameters)
         else:
             self._last = scene["felt"].copy()
             self.solution = Solution(self._last, True, int(osqp.SolverStatus.OSQP_SOLVED), 0, 0.0, 0.0, 0.0)

@@ -6,11 +6,7 @@ from math import inf
 
 import numpy as np
 
-from shared_control_env.core.longitudinal_risk import PRECEDING
-from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
-
-VEHICLE_LENGTH = 5.0
-"""Length taken off the distance of the centres [m]; highway-env's vehicles."""
+from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
 
 
 def lead_of(scene: np.ndarray) -> tuple[float, float]:
@@ -22,4 +18,4 @@ def lead_of(scene: np.ndarray) -> tuple[float, float]:
     near = scene["neighbours"][PRECEDING].tolist()
     if not near[PRESENT]:
         return inf, 0.0
-    return near[NEAR_S] - float(scene["z"][0]) - VEHICLE_LENGTH, near[NEAR_SPEED]
+    return near[NEAR_S] - float(scene["z"][0]) - float(scene["bodies"]), near[NEAR_SPEED]

@@ -7,7 +7,7 @@ from math import atan2, exp, inf
 import numpy as np
 
 from shared_control_env.controllers.lead import lead_of
-from shared_control_env.core.traffic import idm_acceleration
+from shared_control_env.core.world.traffic import idm_acceleration
 
 
 class ScriptedDriver:
@@ -15,7 +15,7 @@ class ScriptedDriver:
 
     ``delta = L kappa - psi - atan(k y / (v + v_0))`` at the centre of mass, with the road's curvature fed forward
     (Hoffmann et al., Autonomous Automobile Trajectory Tracking for Off-Road Driving, ACC 2007); the acceleration is
-    :func:`core.traffic.idm_acceleration` towards the target speed, which is that of a slower vehicle ahead.
+    :func:`core.world.traffic.idm_acceleration` towards the target speed, which is that of a slower vehicle ahead.
 
     Args:
         gain: k, lateral gain [1/s].
@@ -72,7 +72,7 @@ class DistractedDriver:
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired acceleration and steering, shape (2,)."""
         t = float(scene["t"])
-        if self._since == -inf and observation[-1] < self.notice:
+        if self._since == -inf and scene["displayed"] < self.notice:
             self._since = t
         awake = t - self._since - self.reaction if self._since > -inf else 0.0
         w = 1.0 - exp(-max(awake, 0.0) / self.recovery)

@@ -1,1 +1,1 @@
-"""The model as array functions compiled by numba; needs neither gymnasium nor highway-env."""
+"""The model, compiled by numba: array functions that know neither Gymnasium nor highway-env."""

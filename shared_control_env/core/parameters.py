@@ -11,7 +11,10 @@ import math
 import statistics
 from typing import Annotated, NamedTuple
 
+import numpy as np
 from annotated_types import Interval
+
+from shared_control_env.core.records import MAX_TERMS
 
 FASTEST = 60.0
 """Highest speed that can be set [m/s]: half as much again as the model is right for."""
@@ -56,6 +59,8 @@ class VehicleParameters(NamedTuple):
         C_r: cornering stiffness of one rear tyre [N/rad]; ours (the paper prints none).
         length: body length [m]; highway-env's vehicle.
         width: body width v_w [m]; paper, Table V.
+        mu: friction of tyre and road [-]; ours, for tyres that heed it (Eq. 11's do not).
+        tyre: where the compiled force of its tyres is (:mod:`core.world.tyre`), 0 for Eq. 11's linear ones.
     """
 
     m: Mass = 2000.0
@@ -66,6 +71,8 @@ class VehicleParameters(NamedTuple):
     C_r: Stiffness = 60_000.0
     length: BodyLength = 5.0
     width: BodyWidth = 2.0
+    mu: Annotated[float, Interval(ge=0.05, le=2.0)] = 0.9
+    tyre: int = 0
 
 
 class Limits(NamedTuple):
@@ -218,7 +225,7 @@ class InternalModelParameters(NamedTuple):
 
 
 class PersonParameters(NamedTuple):
-    """What is between the eye and the command of a person at the wheel (:mod:`core.person`); all ours.
+    """What is between the eye and the command of a person at the wheel (:mod:`core.control.person`); all ours.
 
     Attributes:
         active: whether the predictive driver is a person; all else acts then alone.
@@ -288,25 +295,17 @@ IDENTIFIED_DRIVERS: dict[str, DriverLagParameters] = {
 
 
 class RewardParameters(NamedTuple):
-    """Weights of the reward's terms, all ours; every term is documented in :mod:`core.reward`.
+    """Terms of the reward (:mod:`core.feedback.reward`), and how much each counts; all ours.
 
     Attributes:
-        progress: weight of the progress along the lane [-].
-        lane: weight of the squared lateral error [-].
-        speed: weight of the speed error [-].
-        effort: weight of the driver's squared command [-].
-        comfort: weight of jerk and lateral acceleration squared [-].
-        conflict: weight of the driver working against the automation [-].
-        failure: weight of the step that ends in a collision or off the road [-].
+        n_terms: how many there are.
+        addresses: where their compiled functions are, shape (MAX_TERMS,).
+        weights: of the terms [-], shape (MAX_TERMS,).
     """
 
-    progress: Weight = 1.0
-    lane: Weight = 0.5
-    speed: Weight = 0.5
-    effort: Weight = 0.1
-    comfort: Weight = 0.05
-    conflict: Weight = 0.1
-    failure: Weight = 50.0
+    n_terms: int = 0
+    addresses: Annotated[np.ndarray, (MAX_TERMS,), np.int64] = np.zeros(MAX_TERMS, dtype=np.int64)
+    weights: Annotated[np.ndarray, (MAX_TERMS,)] = np.zeros(MAX_TERMS)
 
 
 def fitted_arms() -> tuple[tuple[float, float], tuple[float, float]]:
@@ -368,10 +367,14 @@ class TaskParameters(NamedTuple):
 
 
 class DegradationParameters(NamedTuple):
-    """One degradation of the automation (:mod:`core.degradation`); all ours but the paper's two biases.
+    """One degradation of the automation (:mod:`core.faults`); all ours but the paper's two biases.
 
     Attributes:
-        kind: index in :data:`core.degradation.KINDS`.
+        kind: place in :data:`core.faults.kinds.KINDS`, 0 for none.
+        act: where the compiled function of its kind is that acts on the command, 0 for none.
+        perceive: the same for the one that acts on perception.
+        advance: the same for the one that advances its memory.
+        in_unit_of_channel: whether the size is in the unit of its channel, or that per second.
         acceleration: whether it acts on the acceleration command.
         steering: whether it acts on the steering command.
         onset: when it sets in [s]; paper, Eq. 17, 18.
@@ -386,6 +389,10 @@ class DegradationParameters(NamedTuple):
     """
 
     kind: int = 0
+    act: int = 0
+    perceive: int = 0
+    advance: int = 0
+    in_unit_of_channel: bool = True
     acceleration: bool = False
     steering: bool = False
     onset: NonNegative = 0.0
@@ -400,7 +407,7 @@ class DegradationParameters(NamedTuple):
 
 
 class TrafficParameters(NamedTuple):
-    """What another vehicle is going to do (:mod:`core.traffic`); all ours.
+    """What another vehicle is going to do (:mod:`core.world.traffic`); all ours.
 
     Attributes:
         follows: whether it keeps its distance by the Intelligent Driver Model; else it holds its speed.
@@ -425,11 +432,9 @@ class AuthorityParameters(NamedTuple):
     """Choice of the fuzzy operators and of the authority law, by code.
 
     Attributes:
-        law: index in :data:`core.authority.LAWS`; paper, Eq. 10.
-        operators: index in :data:`core.fuzzy.OPERATORS`; ours.
-        iterations: Gauss-Newton iterations of the automation per step; ours.
-        first_iterations: the same at the first step, from a cold start; ours.
-        fault_at: index in :data:`core.degradation.PLACES`, where the degradations of the command act; paper: command.
+        law: index in :data:`core.authority.laws.LAWS`; paper, Eq. 10.
+        operators: index in :data:`core.authority.fuzzy.OPERATORS`; ours.
+        fault_at: index in :data:`core.faults.command.PLACES`, where degradations of the command act; paper: command.
         shared: whether the monitor perceives what the automation misperceives; ours.
         strict: whether the second line of Eq. 10 holds for alpha < 1 alone, as printed.
     """
@@ -439,6 +444,16 @@ class AuthorityParameters(NamedTuple):
     fault_at: int = 1
     shared: bool = False
     strict: bool = False
+
+
+class SolverParameters(NamedTuple):
+    """Effort of the automation's solver.
+
+    Attributes:
+        iterations: Gauss-Newton iterations per step; ours.
+        first_iterations: the same at the first step, from a cold start; ours.
+    """
+
     iterations: int = 3
     first_iterations: int = 5
 
@@ -447,7 +462,8 @@ class Parameters(NamedTuple):
     """Everything that one environment is set up with; the parts are documented in their classes.
 
     Attributes:
-        vehicle: the ego vehicle.
+        vehicle: the ego vehicle, as it drives.
+        model: the ego vehicle as controllers, person and risk assessment take it to be, with linear tyres.
         limits: limits of the commands.
         automation: weights of the automation's predictive controller.
         driver: weights of the driver's predictive controller; the paper's are the same.
@@ -460,10 +476,12 @@ class Parameters(NamedTuple):
         person: what is between the driver's eye and the command.
         reward: weights of the reward.
         task: lane, speed and time step.
-        authority: operators, law and solver iterations.
+        authority: operators and law.
+        solver: effort of the automation's solver.
     """
 
     vehicle: VehicleParameters = VehicleParameters()
+    model: VehicleParameters = VehicleParameters()
     limits: Limits = Limits()
     automation: PredictiveParameters = PredictiveParameters()
     driver: PredictiveParameters = PredictiveParameters()
@@ -477,3 +495,4 @@ class Parameters(NamedTuple):
     reward: RewardParameters = RewardParameters()
     task: TaskParameters = TaskParameters()
     authority: AuthorityParameters = AuthorityParameters()
+    solver: SolverParameters = SolverParameters()

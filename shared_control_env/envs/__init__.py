@@ -1,4 +1,4 @@
-"""The highway-env-derived environments.
+"""The highway-env-derived environments, such as ``TwoLaneEnv``: one class a scenario (:mod:`envs.scenarios`).
 
 They are imported when they are first asked for: the vectorised environment needs the settings alone, and
 highway-env takes longer to import than everything else.
@@ -7,39 +7,13 @@ highway-env takes longer to import than everything else.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from shared_control_env.envs.scenarios import (
-        BendEnv,
-        CurveEnv,
-        CurveWithLeadEnv,
-        CutInEnv,
-        DenseTrafficEnv,
-        LaneChangeEnv,
-        LaneKeepingEnv,
-        LeadBrakingEnv,
-        SCurveEnv,
-        TwoLaneEnv,
-    )
-    from shared_control_env.envs.shared_control import SharedControlEnv
-
-__all__ = [
-    "BendEnv",
-    "CurveEnv",
-    "CurveWithLeadEnv",
-    "CutInEnv",
-    "DenseTrafficEnv",
-    "LaneChangeEnv",
-    "LaneKeepingEnv",
-    "LeadBrakingEnv",
-    "SCurveEnv",
-    "SharedControlEnv",
-    "TwoLaneEnv",
-]
+from typing import Any
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__:
-        return getattr(import_module("shared_control_env.envs.scenarios"), name)
+    """``SharedControlEnv``, or the class of a scenario."""
+    if name == "SharedControlEnv":
+        return import_module("shared_control_env.envs.shared_control").SharedControlEnv
+    if name.endswith("Env"):
+        return getattr(import_module("shared_control_env.envs.environments"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.action import ActionType
 
+from shared_control_env.envs.highway.vehicles import EgoVehicle
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, Clipping, checked_slot, space_of
-from shared_control_env.envs.vehicles import EgoVehicle
-
-if TYPE_CHECKING:
-    from shared_control_env.envs.shared_control import SharedControlEnv
 
 
 class SlotAction(ActionType):
     """Action of the bare environment, a dict of both slots."""
 
-    env: SharedControlEnv
-
-    def __init__(self, env: SharedControlEnv) -> None:
+    def __init__(self, env: Any) -> None:
         super().__init__(env)
         self.clipping = Clipping()
 
@@ -41,7 +36,7 @@ class SlotAction(ActionType):
             action: dict with the keys ``driver`` and ``authority``.
 
         Returns:
-            ``u_h,des = [a, delta]`` [m/s^2, rad], shape (2,), and alpha_a.
+            ``u_h,des = [a, delta]`` over its limits, in [-1, 1], shape (2,), and alpha_a.
 
         Raises:
             ValueError: if a slot is missing, unknown, of the wrong shape or not finite.
@@ -52,5 +47,4 @@ class SlotAction(ActionType):
                 "AuthorityLimiter and DriverModel bind one each"
             )
         command = checked_slot(DRIVER, action[DRIVER], self.clipping)
-        command *= self.env.command_limits
         return command, float(checked_slot(AUTHORITY, action[AUTHORITY], self.clipping)[0])

@@ -1,4 +1,4 @@
-"""The library of degradations: each a kind of :mod:`core.degradation` with published ranges to draw it from."""
+"""The library of degradations: each a kind of :mod:`core.faults` with published ranges to draw it from."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shared_control_env.core.faults.kinds import KINDS
 from shared_control_env.core.parameters import Limits
+from shared_control_env.nearest import hint
 
 Range = tuple[float, float]
-
-NOISES = ("white_noise", "coloured_noise")
-"""Kinds of degradation that draw numbers, and whose size is a standard deviation."""
 
 
 class Degradation(NamedTuple):
@@ -19,7 +18,7 @@ class Degradation(NamedTuple):
 
     Attributes:
         description: what goes wrong.
-        kind: of :data:`core.degradation.KINDS`.
+        kind: of :data:`core.faults.kinds.KINDS`.
         channels: candidates; the kinds that concern perception have no channel.
         size: range of the size, None where the kind has none. In the channel's limit (5 m/s^2, 30 deg) for those
             with ``of_limit``, else in the unit of the kind.
@@ -86,6 +85,23 @@ DEGRADATIONS: dict[str, Degradation | None] = {
 """The library by name. The sizes run from what a driver hardly notices to what leaves the lane within a second."""
 
 
+def add_degradation(name: str, degradation: Degradation) -> None:
+    """Add a degradation, which settings and suites may name from then on; no scenario draws it by itself.
+
+    Args:
+        name: in ``config["degradations"]`` and in suites.
+        degradation: its kind is one of :data:`core.faults.kinds.KINDS`.
+
+    Raises:
+        ValueError: if the name is taken, or the kind unknown.
+    """
+    if name in DEGRADATIONS:
+        raise ValueError(f"degradation {name!r} is there already")
+    if degradation.kind not in KINDS:
+        raise ValueError(f"degradation {name!r} has kind = {degradation.kind!r}; {hint(degradation.kind, KINDS)}")
+    DEGRADATIONS[name] = degradation
+
+
 def draw_degradation(name: str, limits: Limits, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Settings of the faults that a named degradation consists of, its numbers drawn.
 
@@ -110,7 +126,7 @@ def draw_degradation(name: str, limits: Limits, rng: np.random.Generator) -> lis
         "ramp": _between(entry.ramp, ramp),
         "period": _between(entry.period, period),
     }
-    if entry.kind in NOISES:
+    if KINDS[entry.kind].draws:
         fault["seed"] = seed
     if entry.size is not None:
         bound = limits.a_max if channel == "acceleration" else limits.delta_max

@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from shared_control_env.core.faults.kinds import KINDS
 from shared_control_env.core.parameters import Limits
-from shared_control_env.envs.degradations import NOISES, draw_degradation
+from shared_control_env.envs.degradations import draw_degradation
 from shared_control_env.envs.settings import CUT_OFF, RandomSettings, Settings, check, plain
 from shared_control_env.envs.settings.changes import at
 
 
 def is_random(settings: Settings) -> bool:
     """Whether anything is drawn at the start of an episode."""
-    noisy = any(fault.kind in NOISES and fault.seed is None for fault in settings.faults)
+    noisy = any(KINDS[fault.kind].draws and fault.seed is None for fault in settings.faults)
     person = settings.person.active and settings.person.seed is None
     return bool(settings.randomise or settings.degradations or noisy or person)
 
@@ -49,7 +50,7 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
     for fault in config["faults"]:
         if fault["seed"] is None:
             seed = int(rng.integers(2**31))  # for every kind, so that the next draws do not depend on this one's kind
-            if fault["kind"] in NOISES:
+            if KINDS[fault["kind"]].draws:
                 fault["seed"] = seed
     if settings.has_person and settings.person.seed is None:
         config["person"]["seed"] = int(own.integers(2**31))

@@ -1,32 +1,33 @@
-"""The driver's view as a highway-env observation type."""
+"""An observation of the core as a highway-env observation type."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.observation import ObservationType
 
-from shared_control_env.core import single
-from shared_control_env.core.observation import FEATURES
-
-if TYPE_CHECKING:
-    from shared_control_env.envs.shared_control import SharedControlEnv
+from shared_control_env.core.feedback.observation import Observation
+from shared_control_env.envs.outputs import observation_space
 
 
-class DriverObservation(ObservationType):
-    """What a driver can perceive (:data:`core.observation.FEATURES`); the fault is not in it."""
+class CoreObservation(ObservationType):
+    """What the core wrote of the present scene.
 
-    env: SharedControlEnv
+    Args:
+        env: the environment, whose ``observation`` it gives.
+        observation: which it is.
+    """
+
+    def __init__(self, env: Any, observation: Observation) -> None:
+        super().__init__(env)
+        self.observation = observation
 
     def space(self) -> spaces.Box:
-        """Box of shape (25,) in [-1, 1]."""
-        return spaces.Box(-1.0, 1.0, shape=(len(FEATURES),), dtype=np.float32)
+        """Box of shape (n,) in [-1, 1]."""
+        return observation_space(self.observation)
 
     def observe(self) -> np.ndarray:
         """Observation of the present scene, a new array."""
-        env = self.env
-        observation = np.empty(len(FEATURES), dtype=np.float32)
-        single.observe(env.scene, env.memory, env.line, env.parameters, observation)
-        return observation
+        return self.env.observation.copy()

@@ -1,96 +1,300 @@
-"""The environments of the registered scenarios (:mod:`envs.cases`)."""
+"""The registered scenarios as settings: the paper's two cases, and eight that are drawn within ranges."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, NamedTuple
 
-from shared_control_env.envs import cases
-from shared_control_env.envs.cases import CASES, Case
-from shared_control_env.envs.settings import merge
-from shared_control_env.envs.shared_control import SharedControlEnv
+import gymnasium as gym
 
 
-class ScenarioEnv(SharedControlEnv):
-    """Environment of one scenario: its settings are the defaults.
+class Scenario(NamedTuple):
+    """A registered scenario.
 
     Attributes:
-        case: the scenario.
+        id: with Gymnasium.
+        description: in a line.
+        settings: changes to the default settings.
     """
 
-    case: ClassVar[Case]
-
-    @classmethod
-    def default_config(cls) -> dict[str, Any]:
-        """Settings of the scenario."""
-        return merge(super().default_config(), cls.case.settings)
+    id: str
+    description: str
+    settings: dict[str, Any]
 
 
-class TwoLaneEnv(ScenarioEnv):
-    """Case 1: lane keeping behind a slower vehicle on a straight two-lane road; the steering degrades."""
-
-    case = cases.TWO_LANE
+def _draw(setting: str, low: float, high: float) -> dict[str, Any]:
+    return {"setting": setting, "low": low, "high": high}
 
 
-class CurveEnv(ScenarioEnv):
-    """Case 2: following a vehicle round a curve of 60 m radius; the acceleration degrades."""
-
-    case = cases.CURVE
+def _choose(setting: str, *choices: float) -> dict[str, Any]:
+    return {"setting": setting, "choices": list(choices)}
 
 
-class LaneKeepingEnv(ScenarioEnv):
-    """Straight road, two lanes: keep the lane behind a slower vehicle, with others beside."""
+DRAWN_V0 = (
+    *("bias_ramp", "step_bias", "loss_of_effectiveness", "stuck", "rate_limit", "saturation", "delay"),
+    *("white_noise", "coloured_noise", "oscillation", "drop_out", "intermittent", "sign_error"),
+    *("lane_offset", "missed_lead", "complete_failure"),
+)
+"""Degradations that the drawn scenarios of version 0 draw from; what is added to the library is not among them."""
 
-    case = cases.LANE_KEEPING
+_CURVATURES = [sign / radius for radius in (60.0, 80.0, 120.0, 200.0) for sign in (1.0, -1.0)]
+"""Curves to the left and to the right [1/m]."""
 
+_BEND_ROAD = {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0, "curvature": 1.0 / 60.0}]}
+"""A straight, then an arc whose curvature is drawn."""
 
-class BendEnv(ScenarioEnv):
-    """A curve to either side, free road."""
+TWO_LANE = Scenario(
+    id="SharedControl/TwoLane-v0",
+    description="Case 1: straight, two lanes, following a slower vehicle at 12 m/s; steering drifts off by 0.3 rad",
+    settings={
+        "vehicles": [
+            {"lane": 0, "position": 38.0, "speed": 12.0},  # preceding
+            {"lane": 1, "position": 30.0, "speed": 15.0},  # leader
+            {"lane": 1, "position": -5.0, "speed": 12.0},  # follower
+        ],
+        # delta_f = delta_des + 0.3 (k - 10) / 20 for 10 <= k <= 30, then + 0.3.
+        "faults": [{"channel": "steering", "onset": 0.5, "ramp": 1.0, "size": 0.3}],
+    },
+)
+"""Case 1 (Section VI-B, Table VI): lane keeping behind a slower vehicle on a straight road; the steering degrades."""
 
-    case = cases.BEND
+CURVE = Scenario(
+    id="SharedControl/Curve-v0",
+    description="Case 2: curve of 60 m radius behind a vehicle at 12 m/s; acceleration drifts off by 3 m/s^2",
+    settings={
+        "road": {"segments": [{"length": 300.0, "curvature": 1.0 / 60.0}]},
+        "ego": {"speed": 12.0},
+        "vehicles": [{"lane": 0, "position": 15.0, "speed": 12.0}],
+        # a_f = a_des + 3 (k - 5) / 5 for 5 < k <= 10, then + 3.
+        "faults": [{"channel": "acceleration", "onset": 0.25, "ramp": 0.25, "size": 3.0}],
+        "screen_height": 632,
+    },
+)
+"""Case 2 (Section VI-C): following a vehicle round a curve of 60 m radius; the acceleration degrades."""
 
-
-class SCurveEnv(ScenarioEnv):
-    """Two arcs one after the other, free road."""
-
-    case = cases.S_CURVE
-
-
-class LaneChangeEnv(ScenarioEnv):
-    """Change to the left lane past a slower vehicle, in traffic."""
-
-    case = cases.LANE_CHANGE
-
-
-class CutInEnv(ScenarioEnv):
-    """A vehicle from the left lane cuts in."""
-
-    case = cases.CUT_IN
-
-
-class LeadBrakingEnv(ScenarioEnv):
-    """The vehicle ahead brakes to a stop."""
-
-    case = cases.LEAD_BRAKING
-
-
-class DenseTrafficEnv(ScenarioEnv):
-    """Eight vehicles that follow one another and the ego."""
-
-    case = cases.DENSE_TRAFFIC
-
-
-class CurveWithLeadEnv(ScenarioEnv):
-    """A curve to either side behind a vehicle."""
-
-    case = cases.CURVE_WITH_LEAD
-
-
-_CLASSES: tuple[type[ScenarioEnv], ...] = (
-    *(TwoLaneEnv, CurveEnv, LaneKeepingEnv, BendEnv, SCurveEnv, LaneChangeEnv, CutInEnv, LeadBrakingEnv),
-    *(DenseTrafficEnv, CurveWithLeadEnv),
+LANE_KEEPING = Scenario(
+    id="SharedControl/LaneKeeping-v0",
+    description="straight, two lanes: keep the lane behind a slower vehicle, with others beside",
+    settings={
+        "vehicles": [
+            {"lane": 0, "position": 45.0, "speed": 12.0},
+            {"lane": 1, "position": 30.0, "speed": 15.0},
+            {"lane": 1, "position": -15.0, "speed": 13.0},
+        ],
+        "degradations": list(DRAWN_V0),
+        "randomise": [
+            _draw("ego.speed", 12.0, 18.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 12.0, 18.0),
+            _draw("vehicles.0.position", 30.0, 60.0),
+            _draw("vehicles.0.speed", 9.0, 14.0),
+            _draw("vehicles.1.position", 15.0, 45.0),
+            _draw("vehicles.1.speed", 13.0, 18.0),
+            _draw("vehicles.2.position", -25.0, -10.0),
+            _draw("vehicles.2.speed", 11.0, 15.0),
+        ],
+    },
 )
 
+BEND = Scenario(
+    id="SharedControl/Bend-v0",
+    description="a curve of 60 to 200 m radius to either side, free road",
+    settings={
+        "road": _BEND_ROAD,
+        "ego": {"speed": 12.0},
+        "degradations": list(DRAWN_V0),
+        "screen_height": 632,
+        "randomise": [
+            _choose("road.segments.1.curvature", *_CURVATURES),
+            _draw("ego.speed", 9.0, 13.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 9.0, 13.0),
+        ],
+    },
+)
 
-def scenario(name: str) -> type[ScenarioEnv]:
-    """Class of the bare environment of a scenario, by its key in :data:`cases.CASES`."""
-    return next(each for each in _CLASSES if each.case is CASES[name])
+S_CURVE = Scenario(
+    id="SharedControl/SCurve-v0",
+    description="an S-curve, two arcs of 60 to 200 m radius, free road",
+    settings={
+        "road": {
+            "segments": [
+                {"length": 25.0, "curvature": 0.0},
+                {"length": 50.0, "curvature": 1.0 / 60.0},
+                {"length": 50.0, "curvature": -1.0 / 60.0},
+                {"length": 400.0, "curvature": 0.0},
+            ]
+        },
+        "ego": {"speed": 12.0},
+        "degradations": list(DRAWN_V0),
+        "screen_height": 632,
+        "randomise": [
+            _draw("road.segments.1.curvature", 1.0 / 200.0, 1.0 / 60.0),
+            _draw("road.segments.2.curvature", -1.0 / 60.0, -1.0 / 200.0),
+            _draw("ego.speed", 9.0, 13.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 9.0, 13.0),
+        ],
+    },
+)
+
+LANE_CHANGE = Scenario(
+    id="SharedControl/LaneChange-v0",
+    description="change to the left lane past a slower vehicle; both lanes are the driving region",
+    settings={
+        "lane_change": {"onset": 1.5, "duration": 4.0, "lane": 1},
+        "vehicles": [
+            {"lane": 0, "position": 40.0, "speed": 10.0},
+            {"lane": 1, "position": 45.0, "speed": 15.0},
+            {"lane": 1, "position": -20.0, "speed": 13.0},
+        ],
+        "degradations": list(DRAWN_V0),
+        "randomise": [
+            _draw("lane_change.onset", 1.0, 2.0),
+            _draw("lane_change.duration", 3.5, 5.0),
+            _draw("ego.speed", 13.0, 16.0),
+            _draw("vehicles.0.position", 35.0, 50.0),
+            _draw("vehicles.0.speed", 9.0, 12.0),
+            _draw("vehicles.1.position", 35.0, 60.0),
+            _draw("vehicles.1.speed", 14.0, 17.0),
+            _draw("vehicles.2.position", -30.0, -15.0),
+            _draw("vehicles.2.speed", 11.0, 14.0),
+        ],
+    },
+)
+
+CUT_IN = Scenario(
+    id="SharedControl/CutIn-v0",
+    description="a vehicle from the left lane cuts in before the ego",
+    settings={
+        "vehicles": [
+            {
+                "lane": 1,
+                "position": 16.0,
+                "speed": 13.0,
+                "lane_change": {"onset": 2.0, "duration": 3.0, "lane": 0},
+            },
+            {"lane": 0, "position": 60.0, "speed": 13.0},
+        ],
+        "degradations": list(DRAWN_V0),
+        "randomise": [
+            _draw("ego.speed", 13.0, 15.0),
+            _draw("vehicles.0.position", 14.0, 20.0),
+            _draw("vehicles.0.speed", 12.0, 14.0),
+            _draw("vehicles.0.lane_change.onset", 1.0, 2.5),
+            _draw("vehicles.0.lane_change.duration", 2.0, 3.5),
+            _draw("vehicles.1.position", 50.0, 80.0),
+        ],
+    },
+)
+
+LEAD_BRAKING = Scenario(
+    id="SharedControl/LeadBraking-v0",
+    description="the vehicle ahead brakes hard, to a stop",
+    settings={
+        "ego": {"speed": 14.0},
+        "vehicles": [
+            {"lane": 0, "position": 30.0, "speed": 14.0, "brake": {"onset": 2.5, "deceleration": 4.5}},
+            {"lane": 1, "position": -15.0, "speed": 14.0},
+        ],
+        "degradations": list(DRAWN_V0),
+        "randomise": [
+            _draw("ego.speed", 13.0, 15.0),
+            _draw("vehicles.0.position", 25.0, 40.0),
+            _draw("vehicles.0.speed", 13.0, 15.0),
+            _draw("vehicles.0.brake.onset", 1.5, 3.5),
+            _draw("vehicles.0.brake.deceleration", 3.0, 6.0),
+            _draw("vehicles.1.position", -25.0, -10.0),
+        ],
+    },
+)
+
+_DENSE = [(0, 22.0), (0, 44.0), (0, 66.0), (0, -20.0), (1, 8.0), (1, 30.0), (1, 52.0), (1, -14.0)]
+"""Lane and position [m] of the vehicles of dense traffic, before 4 m to either side are drawn."""
+
+DENSE_TRAFFIC = Scenario(
+    id="SharedControl/DenseTraffic-v0",
+    description="eight vehicles that follow one another and the ego by the Intelligent Driver Model",
+    settings={
+        "ego": {"speed": 10.0},
+        "vehicles": [
+            {"lane": lane, "position": position, "speed": 10.0, "behaviour": "idm", "desired_speed": 13.0}
+            for lane, position in _DENSE
+        ],
+        "degradations": list(DRAWN_V0),
+        "randomise": [
+            _draw("ego.speed", 9.0, 11.0),
+            *(
+                entry
+                for i, (_, position) in enumerate(_DENSE)
+                for entry in (
+                    _draw(f"vehicles.{i}.position", position - 4.0, position + 4.0),
+                    _draw(f"vehicles.{i}.speed", 8.0, 12.0),
+                    _draw(f"vehicles.{i}.desired_speed", 9.0, 15.0),
+                )
+            ),
+        ],
+    },
+)
+
+CURVE_WITH_LEAD = Scenario(
+    id="SharedControl/CurveWithLead-v0",
+    description="a curve of 60 to 200 m radius to either side behind a vehicle that follows the road at 9 to 12 m/s",
+    settings={
+        "road": _BEND_ROAD,
+        "ego": {"speed": 12.0},
+        "vehicles": [{"lane": 0, "position": 20.0, "speed": 11.0}],
+        "degradations": list(DRAWN_V0),
+        "screen_height": 632,
+        "randomise": [
+            _choose("road.segments.1.curvature", *_CURVATURES),
+            _draw("ego.speed", 10.0, 13.0),
+            _draw("vehicles.0.position", 15.0, 25.0),
+            _draw("vehicles.0.speed", 9.0, 12.0),
+        ],
+    },
+)
+
+SCENARIOS: dict[str, Scenario] = {
+    "two_lane": TWO_LANE,
+    "curve": CURVE,
+    "lane_keeping": LANE_KEEPING,
+    "bend": BEND,
+    "s_curve": S_CURVE,
+    "lane_change": LANE_CHANGE,
+    "cut_in": CUT_IN,
+    "lead_braking": LEAD_BRAKING,
+    "dense_traffic": DENSE_TRAFFIC,
+    "curve_with_lead": CURVE_WITH_LEAD,
+}
+"""All scenarios by the name that the benchmark and the entry points know them by."""
+
+
+def add_scenario(name: str, scenario: Scenario) -> None:
+    """Add a scenario under its own name: for suites of the benchmark, and with Gymnasium under its id.
+
+    Args:
+        name: for the benchmark, such as ``roundabout``.
+        scenario: its settings are checked when an environment is made of them.
+
+    Raises:
+        ValueError: if the name or the id is taken.
+    """
+    if name in SCENARIOS:
+        raise ValueError(f"scenario {name!r} is there already")
+    if scenario.id in gym.registry:
+        raise ValueError(f"id {scenario.id!r} is registered already")
+    SCENARIOS[name] = scenario
+    register(name)
+
+
+def register(name: str) -> None:
+    """Register a scenario's id with Gymnasium, with the limiter applied: what is left of the action is the driver's.
+
+    Args:
+        name: key of :data:`SCENARIOS`.
+    """
+    gym.register(
+        id=SCENARIOS[name].id,
+        entry_point=f"shared_control_env.wrappers.limited:{name}",
+        vector_entry_point=f"shared_control_env.vector.environment:{name}",
+    )

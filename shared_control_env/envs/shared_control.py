@@ -12,29 +12,39 @@ from highway_env.vehicle.graphics import VehicleGraphics
 from shared_control_env.controllers.automation import Automation, Planner
 from shared_control_env.controllers.driver import checked_command
 from shared_control_env.controllers.solution import Solution
-from shared_control_env.core import delaunay, single
-from shared_control_env.core.info import INFO, as_dict
-from shared_control_env.core.records import FAULT_MEMORY, HEADING, MEMORY, SCENE, SIGNALS, SPEED, X, Y
-from shared_control_env.core.reward import TERMS
-from shared_control_env.core.safe_area import triangulate
+from shared_control_env.core import kernel
+from shared_control_env.core.batch import NOT_LOADED, WORK, Setup
+from shared_control_env.core.control.predictive_driver import PROGRAM
+from shared_control_env.core.feedback.info import INFO, as_dict
+from shared_control_env.core.feedback.observation import OBSERVATIONS
+from shared_control_env.core.loading import load
+from shared_control_env.core.records import HEADING, SPEED, X, Y
+from shared_control_env.core.risk.corridor import new_scratch
+from shared_control_env.core.risk.triangulation import MAX_HOLES, triangulate_any
 from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.action import SlotAction
 from shared_control_env.envs.episode import draw_episode
-from shared_control_env.envs.graphics import SharedControlViewer
-from shared_control_env.envs.inherited import HighwayEnv
-from shared_control_env.envs.observation import DriverObservation
-from shared_control_env.envs.roads import LineRoad
+from shared_control_env.envs.highway.inherited import HighwayEnv
+from shared_control_env.envs.highway.road import LineRoad
+from shared_control_env.envs.highway.vehicles import EgoVehicle, LaneFollower, vehicle_class, write_row
+from shared_control_env.envs.highway.viewer import SharedControlViewer
+from shared_control_env.envs.observation import CoreObservation
+from shared_control_env.envs.outputs import new_outputs
 from shared_control_env.envs.seeds import checked_seed
-from shared_control_env.envs.situation import Situation, start_of
-from shared_control_env.envs.vehicles import EgoVehicle, LaneFollower, vehicle_class
+from shared_control_env.envs.starts import Sizes, empty_batch, empty_starts, refresh_addresses, start_of, write_start
 
 
 class SharedControlEnv(HighwayEnv):
     """Human-machine shared control of one car whose automation degrades.
 
-    A step runs the signals of one time step k: the automation's desired command u_a,des and its degraded
-    form u_a,f are known before it; the action brings the driver's u_h,des and the authority alpha_a; law, driver
-    lag and sum follow; the vehicle moves to k + 1, where the next scene is perceived and planned for.
+    A step runs the signals of one time step k (:mod:`core.loop`): the automation's desired command u_a,des and its
+    degraded form u_a,f are known before it; the action brings the driver's u_h,des and the authority alpha_a; law,
+    driver lag and sum follow; the vehicle moves to k + 1, where the next scene is perceived and planned for.
+
+    The environment is a batch of one in the kernel that steps many: one compiled call a step. highway-env's vehicles
+    are views of its arrays. Where Python has to come in between (an automation of one's own, vehicles of another class,
+    more than eight of them in the driving region, a recorder of every simulation step), the same calls of the loop are
+    made one after the other.
 
     The Cartesian frame is ISO 8855: x forward, y to the left, angles and steering positive to the left, as in
     the paper. highway-env's formulas hold in it unchanged; only its pictures, which draw y downwards, are
@@ -51,10 +61,6 @@ class SharedControlEnv(HighwayEnv):
             with highway-env, and is checked there.
         settings: the same, checked.
         episode: settings of the present episode, with all that is random drawn.
-        parameters: record of :class:`Parameters` that the core runs with.
-        scene: record of :data:`records.SCENE`, the present scene with its safe area.
-        signals: record of :data:`records.SIGNALS`: planned for the present scene after a reset or step.
-        memory: record of :data:`records.MEMORY`.
         command_limits: largest acceleration and steering [m/s^2, rad], shape (2,).
         observation: the last observation.
         noted: record of :data:`info.INFO` of the last step, or reset.
@@ -67,15 +73,17 @@ class SharedControlEnv(HighwayEnv):
             raise ValueError(f"render_mode = {render_mode!r} must be one of {self.metadata['render_modes']} or None")
         # highway-env updates metadata, which is the class's own dict, at every reset.
         self.metadata = dict(type(self).metadata)
-        self.scene = np.zeros((), SCENE)
-        self.signals = np.zeros((), SIGNALS)
-        self.memory = np.zeros((), MEMORY)
         self.noted = np.zeros((), INFO)
         self.viewer: SharedControlViewer | None = None
-        self._triangulation = np.zeros((), delaunay.WORKSPACE)
         self._given_automation: Planner | None = None
         self._adopted: dict[str, Any] | None = None
         self._spec: Any = None
+        self._works, self._programs = np.zeros(1, WORK), np.zeros(1, PROGRAM)
+        self._commands, self._alphas = np.zeros((1, 2)), np.zeros((1, 1))
+        self._taken, self._everyone = np.zeros(1, dtype=np.int64), np.ones(1, dtype=bool)
+        self._rewarded, self._ends = np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)
+        self._calls = NOT_LOADED
+        self._bound: list[Any] | None = None
         super().__init__(config=config, render_mode=render_mode)
 
     @classmethod
@@ -99,6 +107,7 @@ class SharedControlEnv(HighwayEnv):
             merged["offscreen_rendering"] = self.render_mode != "human"
         settings = configuration.check(merged)
         self._check_video_speed(settings)
+        self._check_observation(settings)
         self._vehicle_class = vehicle_class(settings.other_vehicles_type)
         self.settings = settings
         self.config, self._adopted = configuration.plain(settings), configuration.plain(settings)
@@ -113,10 +122,19 @@ class SharedControlEnv(HighwayEnv):
                 "new environment, or hand the recorder to set_record_video_wrapper()"
             )
 
+    def _check_observation(self, settings: configuration.Settings) -> None:
+        """Refuse another observation than the spaces were made for."""
+        if self._adopted is not None and settings.observation != self.settings.observation:
+            raise ValueError(
+                f"config['observation']['type'] = {settings.observation.type!r}: the spaces of this environment are "
+                f"made for {self.settings.observation.type!r}; make a new one"
+            )
+
     def define_spaces(self) -> None:
         """Build action and observation types once: new spaces would forget the user's seed."""
         if self.action_space is None:
-            self.observation_type = DriverObservation(self)
+            self._observation = OBSERVATIONS[self.settings.observation.type]
+            self.observation_type = CoreObservation(self, self._observation)
             self.action_type = SlotAction(self)
             self.observation_space = self.observation_type.space()
             self.action_space = self.action_type.space()
@@ -174,10 +192,7 @@ class SharedControlEnv(HighwayEnv):
         if self.viewer is not None and not self.viewer.shows(self.config):
             self.viewer.close()
             self.viewer = None
-        self._perceive_and_plan()
-        self.observation = self.observation_type.observe()
-        self.noted = self._note_signals()
-        single.note_start(self.scene, self.parameters, self.memory, self.noted)
+        self._advance(resetting=True)
         info = self._info(self.observation)
         if self.render_mode == "human":
             self.render()
@@ -187,10 +202,9 @@ class SharedControlEnv(HighwayEnv):
         """Draw the episode; make road, vehicles and controllers from its settings."""
         settings = self.episode = draw_episode(self.settings, self.np_random)
         start = start_of(settings)
-        self.line, self.faults, self.parameters = start.line, start.faults, start.parameters
-        self._fault_at_actuator = settings.fault_at == "actuator"
-        self._fault_memories = np.zeros(len(self.faults), FAULT_MEMORY)
-        self.scene["felt"] = 0.0
+        self._batch = empty_batch(1, Sizes(len(start.faults), len(start.line), len(start.traffic)))
+        write_start(start, self._batch, 0)
+        self.episode_steps, self._terms = settings.steps, settings.terms
         self.command_limits = np.array(list(self.parameters["limits"][()]))
         self.road = LineRoad(
             self.line,
@@ -199,58 +213,86 @@ class SharedControlEnv(HighwayEnv):
             np_random=self.np_random,
             neighbour_vehicles_connected_lanes=settings.neighbour_vehicles_connected_lanes,
         )
-        self._place_vehicles(start)
-        self.road.update_rows()
-        self._corners = np.zeros((len(self.traffic), 4, 2))
-        self._terms = np.zeros(len(TERMS))
-        self.episode_steps = settings.steps
+        self._place_vehicles()
+        self._bind()
         self._path = np.zeros((settings.steps + 1, 2))
         given = self._given_automation
         self._automation = Automation(self.parameters) if given is None else given
         self._automation.reset()
-        single.clear_memory(self.memory)
-        single.clear_signals(self.signals)
 
-    def _place_vehicles(self, start: Situation) -> None:
+    def _place_vehicles(self) -> None:
         """Put the ego and the other vehicles on the road."""
-        ego = EgoVehicle(self.road, start.ego, self.episode.task.target_speed, self.parameters)
+        batch = self._batch
+        ego = EgoVehicle(self.road, batch.states[0], self.episode.task.target_speed, self.parameters)
         ego.color = VehicleGraphics.EGO_COLOR
         self.controlled_vehicles = [ego]
         self.road.vehicles = [ego]
-        for (x, y, heading, speed), plan in zip(start.traffic[:, [X, Y, HEADING, SPEED]], start.plans, strict=True):
+        for (x, y, heading, speed), plan in zip(
+            batch.traffic[0][:, [X, Y, HEADING, SPEED]], batch.plans[0], strict=True
+        ):
             vehicle = self._vehicle_class(self.road, (x, y), heading=float(heading), speed=float(speed))
             if isinstance(vehicle, LaneFollower):
                 vehicle.plan[()] = plan
             self.road.vehicles.append(vehicle)
 
-    def _perceive_and_plan(self) -> None:
-        """Perceive the scene, find its safe area, let the automation decide, degrade it, assess the risk."""
-        p, scene, signals, state = self.parameters, self.scene, self.signals, self.vehicle.array
-        # An episode may be driven on past its end; the picture's path stays within the duration.
-        self._path[min(self.steps, len(self._path) - 1)] = state[:2]
-        count = single.sense(self.steps, state, self.traffic, self.line, p, scene, self._corners)
-        if count <= delaunay.MAX_HOLES:
-            single.find_area(self._corners, count, p, scene, self._triangulation)
-        else:
-            start, end, low, high = scene["region"].tolist()
-            single.search(triangulate(start, end, low, high, self._corners[:count]), p, scene)
-        y, v_target = single.misjudge(scene, self.faults, p, signals)
-        try:
-            self.solution = self._automation.act(scene)
-        finally:
-            single.judge_rightly(scene, y, v_target)
-        signals["u_a_des"] = self._desired()
-        signals["status"], signals["iterations"] = self.solution.status, self.solution.iterations
-        signals["residual"] = self.solution.dual_residual
-        single.monitor(scene, self.traffic, self.line, self.faults, self._fault_memories, p, signals)
+    def _bind(self) -> None:
+        """Have the vehicles' arrays be those of the batch: after a reset, a copy, or when there are others."""
+        ego, others = self.vehicle, self.road.vehicles[1:]
+        batch = self._batch
+        states, traffic = np.zeros((1, 6)), np.zeros((1, len(others), 8))
+        plans = np.zeros((1, len(others)), batch.plans.dtype)
+        states[0], ego.array, ego.parameters = ego.array, states[0], self.parameters
+        for j, vehicle in enumerate(others):
+            if isinstance(vehicle, LaneFollower):
+                plan = plans[0, j : j + 1].reshape(())
+                traffic[0, j], plan[()] = vehicle.array, vehicle.plan
+                vehicle.array, vehicle.plan = traffic[0, j], plan
+            else:
+                write_row(vehicle, traffic[0, j])
+        self._batch = batch._replace(states=states, traffic=traffic, plans=plans)
+        self._foreign = [
+            (vehicle, row) for vehicle, row in zip(others, traffic[0], strict=True) if type(vehicle) is not LaneFollower
+        ]
+        self._corners = np.zeros((len(others), 4, 2))
+        self.road.rows = np.zeros((0, 8))
+        self._bound = [ego, *self.road.vehicles]
+        self._load()
 
-    def _desired(self) -> np.ndarray:
-        """The automation's command; one of another automation is checked, and kept within the limits."""
-        if self._given_automation is None:
-            return self.solution.command
-        if not isinstance(self.solution, Solution):
-            raise ValueError(f"automation.act() gave {self.solution!r}, which is no controllers.solution.Solution")
-        return np.clip(checked_command(self.solution.command, "automation"), -self.command_limits, self.command_limits)
+    def _load(self) -> None:
+        """Have all compiled that a step runs, and say how it runs."""
+        settings = self.episode
+        self._setup = Setup(
+            starts=empty_starts(0, Sizes(0, 0, 0)),  # the start is in the batch
+            steps=settings.steps,
+            frames=settings.simulation_frequency // settings.policy_frequency,
+            dt=1.0 / settings.simulation_frequency,
+            calls=self._calls,
+            scales=self._observation.scales,
+        )
+        self._outputs = new_outputs(1, self._observation.size)
+        if self._calls == NOT_LOADED:
+            self._calls = load(lambda: self._run_kernel(~self._everyone), False, None, self._observation)
+            self._setup = self._setup._replace(calls=self._calls)
+
+    def _run_kernel(self, active: np.ndarray) -> None:
+        """One step of the batch of one."""
+        self._taken[0] = 0
+        kernel.advance(
+            self._taken,
+            1,
+            active,
+            True,
+            self._commands,
+            self._alphas,
+            self._batch,
+            self._setup,
+            self._outputs,
+            self._rewarded,
+            self._ends,
+            self._works,
+            self._programs,
+            0,
+        )
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Drive one time step.
@@ -264,76 +306,139 @@ class SharedControlEnv(HighwayEnv):
         Raises:
             ValueError: if the action is malformed; nothing has moved then.
         """
-        command, alpha_a = self.action_type.decode(action)
-        last_a, previous_s = float(self.memory["u"][0]), float(self.scene["z"][0])
-        p, scene, memory, signals = self.parameters, self.scene, self.memory, self.signals
-        if self._fault_at_actuator:
-            single.blend_degraded(command, alpha_a, p, self.faults, self._fault_memories, scene, memory, signals)
-        else:
-            single.blend(command, alpha_a, p, scene, memory, signals)
-        self.noted = self._note_signals()
-        self._simulate(self.signals["u"])
-        self._perceive_and_plan()
-        self._outcome = single.conclude(
-            previous_s,
-            last_a,
-            bool(self.vehicle.crashed),
-            self.scene,
-            self.signals,
-            self.parameters,
-            self.memory,
-            self._terms,
-            self.noted,
-            self.episode_steps,
-        )
-        self.observation = self.observation_type.observe()
+        self._commands[0], self._alphas[0, 0] = self.action_type.decode(action)
+        if self._bound != [self.vehicle, *self.road.vehicles]:
+            self._bind()
+        self._advance(resetting=False)
         reward, terminated, truncated = self._reward(action), self._is_terminated(), self._is_truncated()
         info = self._info(self.observation, action)
         if self.render_mode == "human":
             self.render()
         return self.observation.copy(), reward, terminated, truncated, info
 
+    def _advance(self, resetting: bool) -> None:
+        """A step, or the begin of an episode: in one compiled call, or in several with Python in between."""
+        frames = self._setup.frames
+        recorder = self._record_video_wrapper
+        every_frame = recorder is not None and recorder.recording and frames > 1
+        # Observation and info are the caller's, so they are new every time.
+        self._outputs = self._outputs._replace(
+            observations=np.zeros((1, self._observation.size), np.float32), infos=np.zeros(1, INFO)
+        )
+        self._batch.ended[0] = resetting
+        if self._given_automation is None and not self._foreign and not every_frame and len(self._corners) <= MAX_HOLES:
+            self._run_kernel(self._everyone)
+            if not resetting:
+                self.road.pass_frames(frames, self._setup.dt)
+                self.vehicle.crashed |= bool(self._batch.transitions["crashed"][0])
+        else:
+            self._advance_with_python(resetting)
+        if not resetting:
+            self.steps += 1
+            self.time = self.steps / self.episode.policy_frequency
+        # An episode may be driven on past its end; the picture's path stays within the duration.
+        self._path[min(self.steps, len(self._path) - 1)] = self._batch.states[0, :2]
+        self.noted, self.observation = self._outputs.infos.reshape(()), self._outputs.observations[0]
+
+    def _advance_with_python(self, resetting: bool) -> None:
+        """The calls of :func:`kernel.advance` one after the other, with Python's vehicles and automation in between."""
+        batch, setup, out, works = self._batch, self._setup, self._outputs, self._works
+        given, signals = self._given_automation, self.signals
+        if not resetting:
+            kernel.respond(self._commands, self._alphas, batch, setup, out, works, self._programs)
+            self._simulate(signals["u"])
+            batch.transitions["crashed"][0] = self.vehicle.crashed
+        for vehicle, row in self._foreign:
+            write_row(vehicle, row)
+        k = 0 if resetting else self.steps + 1
+        count = kernel.look(k, resetting, batch, setup, out, works, self._corners)
+        if count > MAX_HOLES:
+            triangles = triangulate_any(self.scene["region"], self._corners[:count])
+            kernel.search_among(triangles, batch, works, new_scratch(len(triangles)))
+        if given is not None:
+            kernel.show_automation(batch, works)
+            solution = self._decided(given.act(works["automation_view"][:1].reshape(())))
+            signals["u_a_des"], signals["residual"] = solution.command, solution.dual_residual
+            signals["status"], signals["iterations"] = solution.status, solution.iterations
+            batch.automations["failures"][0] = int(getattr(given, "failures", 0))
+        kernel.judge(given is not None, batch, setup, works)
+        kernel.finish(resetting, batch, setup, out)
+
+    def _decided(self, solution: Any) -> Solution:
+        """What another automation decided, checked, its command kept within the limits."""
+        if not isinstance(solution, Solution):
+            raise ValueError(f"automation.act() gave {solution!r}, which is no controllers.solution.Solution")
+        command = np.clip(checked_command(solution.command, "automation"), -self.command_limits, self.command_limits)
+        return solution._replace(command=command)
+
     def _simulate(self, u: np.ndarray) -> None:
-        """Move all vehicles through one decision's simulation steps under a constant command."""
+        """Move all vehicles through one decision's simulation steps under a constant command, by highway-env."""
         self.vehicle.act({"acceleration": float(u[0]), "steering": float(u[1])})
-        frames = self.episode.simulation_frequency // self.episode.policy_frequency
-        for frame in range(frames):
+        self.road.update_rows()
+        for frame in range(self._setup.frames):
             self.road.act()
-            self.road.step(1.0 / self.episode.simulation_frequency)
-            if self._record_video_wrapper is not None and self._record_video_wrapper.recording and frame + 1 < frames:
-                self._record_video_wrapper._capture_frame()
-        self.steps += 1
-        self.time = self.steps / self.episode.policy_frequency
+            self.road.step(self._setup.dt)
+            recorder = self._record_video_wrapper
+            if recorder is not None and recorder.recording and frame + 1 < self._setup.frames:
+                recorder._capture_frame()
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Record of :class:`core.parameters.Parameters` that the core runs with."""
+        return self._batch.parameters.reshape(())
+
+    @property
+    def scene(self) -> np.ndarray:
+        """Record of :data:`records.SCENE`, the present scene with its safe area."""
+        return self._batch.scenes.reshape(())
+
+    @property
+    def signals(self) -> np.ndarray:
+        """Record of :data:`records.SIGNALS`: planned for the present scene after a reset or step."""
+        return self._batch.signals.reshape(())
+
+    @property
+    def memory(self) -> np.ndarray:
+        """Record of :data:`records.MEMORY`."""
+        return self._batch.memories.reshape(())
+
+    @property
+    def line(self) -> np.ndarray:
+        """Reference line of the road, shape (n, 6)."""
+        return self._batch.lines[0]
+
+    @property
+    def faults(self) -> np.ndarray:
+        """Degradations of the episode, records of :class:`core.parameters.DegradationParameters`, shape (m,)."""
+        return self._batch.faults[0]
+
+    @property
+    def traffic(self) -> np.ndarray:
+        """The other vehicles as rows of :mod:`records`' traffic columns, shape (n, 8)."""
+        return self._batch.traffic[0]
 
     def _reward(self, action: Any) -> float:
-        """Reward of the step just taken: the weighted terms of :mod:`core.reward`."""
-        return self._outcome[0]
+        """Reward of the step just taken: the weighted terms of :mod:`core.feedback.reward`."""
+        return float(self._outputs.rewards[0])
 
     def _rewards(self, action: Any) -> dict[str, float]:
         """The unweighted terms of the step just taken, by name."""
-        return as_dict(self.noted["rewards"])
+        return dict(zip(self._terms, self.noted["rewards"].tolist(), strict=False))
 
     def _is_terminated(self) -> bool:
         """Whether the step just taken ended in a collision or off the road."""
-        return self._outcome[1]
+        return bool(self._outputs.terminations[0])
 
     def _is_truncated(self) -> bool:
         """End of the duration, counted in whole steps, or of the road."""
-        return self._outcome[2]
-
-    def _note_signals(self) -> np.ndarray:
-        """A new record of info that holds the signals of the present time step."""
-        info = np.zeros((), INFO)
-        failures = int(getattr(self._automation, "failures", 0))
-        single.note_signals(self.scene, self.signals, self.faults, failures, info)
-        return info
+        return bool(self._outputs.truncations[0])
 
     def _info(self, obs: np.ndarray, action: Any = None) -> dict[str, Any]:
-        """Every signal of the step just taken, or of the reset (:data:`core.info.INFO`).
+        """Every signal of the step just taken, or of the reset (:data:`core.feedback.info.INFO`).
 
         highway-env's own also carries the action, which is an unseeded sample at a reset; it is left out.
         """
-        info = as_dict(self.noted)
+        info = as_dict(self.noted, self._terms)
         if type(self)._rewards is not SharedControlEnv._rewards:
             info["rewards"] = self._rewards(action)
         return info
@@ -348,11 +453,6 @@ class SharedControlEnv(HighwayEnv):
             float32, shape (2,); beyond [-1, 1] where the command is beyond the limits.
         """
         return (np.asarray(command, dtype=float) / self.command_limits).astype(np.float32)
-
-    @property
-    def traffic(self) -> np.ndarray:
-        """The other vehicles as rows of :mod:`records`' traffic columns, shape (n, 8)."""
-        return self.road.rows[1:]
 
     def show(
         self,
@@ -409,4 +509,10 @@ class SharedControlEnv(HighwayEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickles: all but windows and recorders, which belong to this process."""
-        return {**self.__dict__, "viewer": None, "_record_video_wrapper": None}
+        process = {"viewer": None, "_record_video_wrapper": None, "_calls": NOT_LOADED, "_bound": None}
+        return {**self.__dict__, **process}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on where the pickled or copied one was."""
+        self.__dict__.update(state)
+        refresh_addresses([self.episode], self._batch)

@@ -22,10 +22,10 @@ from shared_control_env.controllers.scripted import (
     OverreactingDriver,
     ScriptedDriver,
 )
-from shared_control_env.core.authority import LAWS
+from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.core.parameters import IDENTIFIED_DRIVERS, PERSONS, PersonParameters, fitted_arms
-from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import as_plain
 from shared_control_env.nearest import hint, nearest
 
@@ -74,7 +74,7 @@ class Suite(NamedTuple):
 
     Attributes:
         description: in a line.
-        scenarios: keys of :data:`envs.cases.CASES`.
+        scenarios: keys of :data:`envs.scenarios.SCENARIOS`.
         degradations: keys of :data:`envs.degradations.DEGRADATIONS`; None for the one that the scenario has.
     """
 
@@ -136,7 +136,7 @@ AUTHORITIES: dict[str, AuthorityEntry] = {
 
 SUITES: dict[str, Suite] = {
     "paper": Suite("the paper's two cases with their own faults", ("two_lane", "curve"), (None,)),
-    "full": Suite("eight drawn scenarios x every degradation and none", tuple(CASES)[2:], tuple(DEGRADATIONS)),
+    "full": Suite("eight drawn scenarios x every degradation and none", tuple(SCENARIOS)[2:], tuple(DEGRADATIONS)),
 }
 """Suites by name."""
 
@@ -268,7 +268,7 @@ def chosen_suite(suite: str | Suite) -> Suite:
     for part in (suite.scenarios, suite.degradations):
         if not isinstance(part, list | tuple) or not part:
             raise ValueError(f"the suite's {part!r} must be a tuple of names, not empty; degradations may hold None")
-    choose("scenario", suite.scenarios, CASES)
+    choose("scenario", suite.scenarios, SCENARIOS)
     named = [name for name in suite.degradations if name is not None]
     if named:
         choose("degradation", named, DEGRADATIONS)

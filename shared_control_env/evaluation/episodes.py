@@ -17,11 +17,10 @@ import numpy as np
 import shared_control_env
 from shared_control_env.controllers.allocators import Allocator, checked_authority
 from shared_control_env.controllers.driver import Driver, checked_command
-from shared_control_env.core.longitudinal_risk import PRECEDING
-from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRESENT
-from shared_control_env.envs.cases import CASES
+from shared_control_env.core.parameters import TRAFFIC_BODY
+from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import Settings, change, merge, plain
-from shared_control_env.envs.situation import TRAFFIC_BODY
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
 from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
 from shared_control_env.evaluation.metrics import Trajectory, measure_all
@@ -44,7 +43,7 @@ class Batch(NamedTuple):
     """Episodes that differ in degradation and seed alone.
 
     Attributes:
-        scenario: key of :data:`envs.cases.CASES`.
+        scenario: key of :data:`envs.scenarios.SCENARIOS`.
         driver: name, and entry.
         authority: name, and entry.
         episodes: degradation (None for the scenario's own) and seed of each.
@@ -107,7 +106,7 @@ def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
         if isinstance(draw, Mapping) and isinstance(draw.get("setting"), str):
             _refuse_clash({k: v for k, v in owners.items() if v[0] != "config"}, "config", draw["setting"], DRAWN)
     if entry.draws:
-        default = merge(plain(Settings()), CASES[batch.scenario].settings)
+        default = merge(plain(Settings()), SCENARIOS[batch.scenario].settings)
         config["randomise"] = [*change(default, batch.config)["randomise"], *entry.draws]
     return config
 
@@ -165,7 +164,7 @@ def versions() -> str:
 def make_environment(batch: Batch, render_mode: str | None = None) -> SharedControlVectorEnv:
     """Environment of a batch's episodes, what the kernel can decide bound."""
     return SharedControlVectorEnv(
-        CASES[batch.scenario],
+        SCENARIOS[batch.scenario],
         len(batch.episodes),
         config=settings_of(batch, None),
         limiter=batch.authority[1].make is None,
@@ -337,4 +336,4 @@ def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, 
 
 def config_hash(scenario: str, changes: Mapping[str, Any]) -> str:
     """Digest of all that a scenario's settings and the changes to them say."""
-    return sha256(json.dumps([CASES[scenario].settings, changes], sort_keys=True).encode()).hexdigest()[:12]
+    return sha256(json.dumps([SCENARIOS[scenario].settings, changes], sort_keys=True).encode()).hexdigest()[:12]

@@ -10,7 +10,7 @@ from typing import Any
 
 import pandas as pd
 
-from shared_control_env.envs.cases import CASES
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.settings import as_plain
 from shared_control_env.evaluation import engines
@@ -141,7 +141,7 @@ def _check_settings(batches: Sequence[Batch]) -> None:
         key = batch.scenario, json.dumps(config, sort_keys=True, default=repr)
         if key not in seen:
             seen.add(key)
-            settings = settings_for_kernel(CASES[batch.scenario], config)
+            settings = settings_for_kernel(SCENARIOS[batch.scenario], config)
             if settings.has_person and batch.driver[1].make is not None:
                 raise ValueError(
                     f"config['person']['active'] = True would not act: {batch.driver[0]!r} is no driver of the kernel"

@@ -8,11 +8,6 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any
 
 
-def cores() -> list[int]:
-    """Cores that this process may use, where the system says."""
-    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
-
-
 class Threads:
     """A number of threads, the calling one among them.
 

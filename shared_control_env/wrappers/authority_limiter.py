@@ -8,8 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from shared_control_env.controllers.allocators import Allocator, checked_authority
-from shared_control_env.core import single
+from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, checked_authority
 from shared_control_env.envs.slots import AUTHORITY
 from shared_control_env.wrappers.slots import SlotWrapper, check_reset
 
@@ -22,7 +21,7 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
 
     Args:
         env: an environment whose authority is open.
-        allocator: another :class:`Allocator` to decide in the fuzzy inference's place.
+        allocator: who decides; by default the fuzzy inference, with the operators of the settings.
 
     Raises:
         ValueError: if the allocator is no object with ``reset`` and ``allocate``.
@@ -37,19 +36,25 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
             )
         if allocator is not None:
             check_reset(allocator, "allocator")
-        self.allocator = allocator
+        self._given = allocator
+        self.allocator: Allocator = self._default() if allocator is None else allocator
+
+    def _default(self) -> FuzzyAuthority:
+        return FuzzyAuthority(self.shared.episode.authority.operators)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Reset environment and allocator; the allocator's seed comes from the environment's generator."""
+        """Reset environment and allocator; the seed of a given one comes from the environment's generator."""
         result = self.env.reset(seed=seed, options=options)
-        if self.allocator is not None:
+        if self._given is None:
+            self.allocator = self._default()
+        else:
             (own,) = self.shared.np_random.spawn(1)
             self.allocator.reset(seed=int(own.integers(2**31)))
         return result
 
     def decide(self) -> np.ndarray:
         """alpha_a of the planned step, shape (1,)."""
-        if self.allocator is not None:
-            scene, signals = self.shared.scene.copy(), self.shared.signals.copy()  # so that none is changed
-            return np.array([checked_authority(self.allocator.allocate(scene, signals))])
-        return np.array([single.fuzzy_authority(self.shared.signals, self.shared.parameters)])
+        scene, signals = self.shared.scene, self.shared.signals
+        if self._given is not None:
+            scene, signals = scene.copy(), signals.copy()  # so that a user's allocator changes none of them
+        return np.array([checked_authority(self.allocator.allocate(scene, signals))])

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from shared_control_env.controllers.allocators import Allocator
 from shared_control_env.controllers.automation import Planner
-from shared_control_env.envs.cases import CASES
-from shared_control_env.envs.scenarios import scenario
+from shared_control_env.envs.environments import environment_class
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.shared_control import SharedControlEnv
 from shared_control_env.wrappers.authority_limiter import AuthorityLimiter
 
@@ -29,7 +30,7 @@ class Limited:
         self,
         config: dict[str, Any] | None = None,
         render_mode: str | None = None,
-        limiter: bool = True,
+        limiter: bool | Allocator = True,
         automation: Planner | None = None,
     ) -> AuthorityLimiter | SharedControlEnv:
         """The scenario's environment.
@@ -37,26 +38,23 @@ class Limited:
         Args:
             config: changes to its settings.
             render_mode: ``human``, ``rgb_array`` or None.
-            limiter: bind alpha_a with the fuzzy inference, as ``gym.make_vec`` does; else both slots of the action are
-                open, for ``AuthorityLimiter`` with an allocator of one's own, or ``DriverModel``.
+            limiter: bind alpha_a with the fuzzy inference, as ``gym.make_vec`` does, or with another allocator; False
+                leaves both slots of the action open.
             automation: who decides u_a,des in the predictive controller's place.
 
         Raises:
-            ValueError: for wrong settings, or what is no automation.
+            ValueError: for wrong settings, or what is no allocator or automation.
         """
-        if not isinstance(limiter, bool):
-            raise ValueError(
-                f"limiter = {limiter!r} must be True or False; an allocator of your own goes into AuthorityLimiter "
-                "around an environment made with limiter=False"
-            )
         env = self.scenario(config, render_mode=render_mode)
         if automation is not None:
             env.automation = automation
-        return AuthorityLimiter(env) if limiter else env
+        if isinstance(limiter, bool):
+            return AuthorityLimiter(env) if limiter else env
+        return AuthorityLimiter(env, limiter)
 
 
 def __getattr__(name: str) -> Limited:
-    """The entry point of a scenario, by its key in :data:`cases.CASES`."""
-    if name not in CASES:
+    """The entry point of a scenario, by its key in :data:`scenarios.SCENARIOS`."""
+    if name not in SCENARIOS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return Limited(scenario(name))
+    return Limited(environment_class(name))

@@ -98,7 +98,7 @@ def test_what_is_no_driving_does_not_pay(weights, reason):
     """With a driver alone, and all that may be lost by ending early lost: an hour of bad returns is not the measure."""
     config = {"authority": {"law": "driver_only"}, "degradations": ["none"], "vehicles": []}
     if weights != "default":
-        config["reward"] = TASKS[weights].reward._asdict()
+        config["reward"] = TASKS[weights].reward
     start = {"ego": {"speed": 3.0}} if reason == "spinning" else {}
     bad = {"standing still": Bad(-5.0, 0.0), "spinning": Bad(0.0, 0.5), "driving off": Bad(2.0, 0.1)}[reason]
     good, paid = (_return(driver, {**config, **start}) for driver in (ScriptedDriver(), bad))

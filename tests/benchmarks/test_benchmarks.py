@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks import controllers, environments, parts, suite, vectors
 from benchmarks.timing import Timing, time_block
-from shared_control_env.vector.threads import cores
+from shared_control_env.core.compile.cold_start import cores
 
 
 def test_timing():

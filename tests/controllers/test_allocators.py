@@ -60,7 +60,7 @@ def test_time_based():
     scene, signals = situation()
     assert allocator.time_to_collision(scene, signals) == inf
     assert allocator.time_to_lane_crossing(scene, signals) == inf
-    scene["neighbours"][2] = 1.0, 20.0, 0.0, 8.0, 0.0
+    scene["neighbours"][2], scene["bodies"] = (1.0, 20.0, 0.0, 8.0, 0.0), 5.0
     signals["prediction"][3] = 13.0
     assert allocator.time_to_collision(scene, signals) == pytest.approx(3.0)
     scene["z"][1], signals["prediction_road"][1] = 0.5, 1.0  # 1 m/s to the left, 1.5 m from the edge

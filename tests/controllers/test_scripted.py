@@ -9,22 +9,22 @@ from shared_control_env.controllers.scripted import (
     OverreactingDriver,
     ScriptedDriver,
 )
+from shared_control_env.core.feedback.observation import DRIVER_V0
 from shared_control_env.core.records import SCENE
 from shared_control_env.wrappers import DriverModel
 
 ALL = (ScriptedDriver, DistractedDriver, OverreactingDriver, FightingDriver)
 
 
-def scene_at(y=0.0, v=15.0, t=0.0, felt=(0.0, 0.0)):
+def scene_at(y=0.0, v=15.0, t=0.0, felt=(0.0, 0.0), displayed=1.0):
     scene = np.zeros((), SCENE)
-    scene["z"][1], scene["z"][3], scene["v_target"], scene["t"], scene["felt"] = y, v, 15.0, t, felt
+    scene["z"][1], scene["z"][3], scene["v_target"], scene["t"] = y, v, 15.0, t
+    scene["felt"], scene["displayed"] = felt, displayed
     return scene
 
 
-def observation(alpha=1.0):
-    seen = np.zeros(25, dtype=np.float32)
-    seen[-1] = alpha
-    return seen
+def observation():
+    return np.zeros(DRIVER_V0.size, dtype=np.float32)
 
 
 @pytest.mark.parametrize("cls", ALL)
@@ -65,20 +65,20 @@ def test_drives_alone(name):
 def test_keeps_its_distance():
     scene = scene_at()
     free = ScriptedDriver().act(observation(), scene)[0]
-    scene["neighbours"][2] = 1.0, 12.0, 0.0, 15.0, 0.0
+    scene["neighbours"][2], scene["bodies"] = (1.0, 12.0, 0.0, 15.0, 0.0), 5.0
     assert ScriptedDriver().act(observation(), scene)[0] < min(free, -1.0)
 
 
 def test_distracted_driver_follows_the_wheel_until_attention_is_back():
     driver, felt = DistractedDriver(notice=0.9, reaction=1.0, recovery=0.5), (1.0, 0.2)
     attentive = ScriptedDriver().act(observation(), scene_at(y=1.0))
-    np.testing.assert_allclose(driver.act(observation(1.0), scene_at(1.0, t=5.0, felt=felt)), felt)
-    driver.act(observation(0.5), scene_at(1.0, t=6.0, felt=felt))
-    np.testing.assert_allclose(driver.act(observation(1.0), scene_at(1.0, t=6.9, felt=felt)), felt)
-    half = driver.act(observation(1.0), scene_at(1.0, t=7.0 + 0.5 * np.log(2.0), felt=felt))
+    np.testing.assert_allclose(driver.act(observation(), scene_at(1.0, t=5.0, felt=felt)), felt)
+    driver.act(observation(), scene_at(1.0, t=6.0, felt=felt, displayed=0.5))
+    np.testing.assert_allclose(driver.act(observation(), scene_at(1.0, t=6.9, felt=felt)), felt)
+    half = driver.act(observation(), scene_at(1.0, t=7.0 + 0.5 * np.log(2.0), felt=felt))
     np.testing.assert_allclose(half, 0.5 * (np.array(felt) + attentive))
     driver.reset()
-    np.testing.assert_allclose(driver.act(observation(1.0), scene_at(1.0, t=9.0, felt=felt)), felt)
+    np.testing.assert_allclose(driver.act(observation(), scene_at(1.0, t=9.0, felt=felt)), felt)
 
 
 def test_over_reacting_and_fighting():

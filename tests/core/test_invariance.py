@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from shared_control_env.core import single
 from shared_control_env.core.parameters import DegradationParameters, Parameters
 from shared_control_env.core.records import FAULT_MEMORY, SIGNALS, pack, record_dtype
-from shared_control_env.core.road import PSI0, X0, Y0, point_at, reference_line
+from shared_control_env.core.world.road import PSI0, X0, Y0, point_at, reference_line
+from tests import compiled
 from tests.scenes import scene_of
 
 PARAMETERS = pack(Parameters())
@@ -17,7 +17,7 @@ def risks(state, others, line, u):
     scene = scene_of(state, PARAMETERS, others, line)
     signals = np.zeros((), SIGNALS)
     signals["u_a_des"] = u
-    single.monitor(scene, others, line, *NO_FAULTS, PARAMETERS, signals)
+    compiled.monitor(scene, others, line, *NO_FAULTS, PARAMETERS, signals)
     return float(signals["r_x"]), float(signals["r_y"])
 
 

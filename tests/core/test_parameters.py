@@ -33,4 +33,4 @@ def test_pack_keeps_every_value():
     assert record.dtype == record_dtype(p.Parameters)
     for section in p.Parameters._fields:
         for name, value in getattr(values, section)._asdict().items():
-            assert record[section][name] == value
+            np.testing.assert_array_equal(record[section][name], value)

@@ -12,8 +12,8 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 import shared_control_env  # noqa: F401
-from shared_control_env.core.observation import FEATURES
-from shared_control_env.core.reward import TERMS
+from shared_control_env.core.feedback.observation import DRIVER_V0
+from shared_control_env.core.feedback.reward import TERMS
 from shared_control_env.envs import CurveEnv, TwoLaneEnv
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel, open_slots
@@ -99,7 +99,7 @@ def test_made_by_id_with_the_limiter_applied(name):
     assert "AuthorityLimiter" in str(env)
     assert open_slots(env) == ("driver",)
     assert env.action_space == gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
-    assert env.observation_space == gym.spaces.Box(-1.0, 1.0, (len(FEATURES),), np.float32)
+    assert env.observation_space == gym.spaces.Box(-1.0, 1.0, (DRIVER_V0.size,), np.float32)
 
 
 def test_made_by_module_and_id_in_a_fresh_process():
@@ -112,7 +112,7 @@ def test_spawned_workers_make_it():
     name = "shared_control_env:SharedControl/Curve-v0"
     envs = gym.vector.AsyncVectorEnv([lambda: gym.make(name)] * 2, context="spawn")
     observations, _ = envs.reset(seed=[1, 2])
-    assert observations.shape == (2, len(FEATURES))
+    assert observations.shape == (2, DRIVER_V0.size)
     envs.step(np.zeros((2, 2), dtype=np.float32))
     envs.close()
 

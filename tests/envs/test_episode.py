@@ -6,17 +6,17 @@ import pytest
 
 from shared_control_env.core.parameters import Limits
 from shared_control_env.envs import TwoLaneEnv
-from shared_control_env.envs.cases import CASES
 from shared_control_env.envs.degradations import DEGRADATIONS, draw_degradation
 from shared_control_env.envs.episode import draw_episode, is_random
+from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import Settings, check, merge, plain
 from shared_control_env.registration import ENVIRONMENTS
 
-DRAWN = [name for name, case in CASES.items() if case.settings.get("randomise")]
+DRAWN = [name for name, case in SCENARIOS.items() if case.settings.get("randomise")]
 
 
 def settings_of(name):
-    return check(merge(plain(Settings()), CASES[name].settings))
+    return check(merge(plain(Settings()), SCENARIOS[name].settings))
 
 
 def at(settings, path):
@@ -27,7 +27,7 @@ def at(settings, path):
 
 
 def test_every_registered_id_has_its_case():
-    assert {id: CASES[name].id for id, name in ENVIRONMENTS.items()} == {id: id for id in ENVIRONMENTS}
+    assert {id: SCENARIOS[name].id for id, name in ENVIRONMENTS.items()} == {id: id for id in ENVIRONMENTS}
 
 
 @pytest.mark.parametrize("name", ["two_lane", "curve"])

@@ -8,7 +8,7 @@ import pytest
 from gymnasium.wrappers import RecordVideo
 
 import shared_control_env  # noqa: F401
-from shared_control_env.envs import graphics
+from shared_control_env.envs.highway import viewer as graphics
 from shared_control_env.wrappers import DriverModel
 
 

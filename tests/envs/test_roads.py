@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from highway_env.vehicle.kinematics import Vehicle
 
-from shared_control_env.core.road import locate, point_at, reference_line
+from shared_control_env.core.parameters import TRAFFIC_BODY
+from shared_control_env.core.world.road import locate, point_at, reference_line
 from shared_control_env.envs import CurveEnv
-from shared_control_env.envs.roads import road_network
-from shared_control_env.envs.situation import TRAFFIC_BODY
+from shared_control_env.envs.highway.road import road_network
 
 SEGMENTS = [(60.0, 0.0), (200.0, 1 / 60), (120.0, -1 / 40), (50.0, 0.0)]
 LINE = reference_line(SEGMENTS, lead_in=50.0)

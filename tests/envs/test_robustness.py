@@ -2,14 +2,17 @@
 
 import numpy as np
 
-from shared_control_env.core import automation_mpc, single
-from shared_control_env.core.delaunay import MAX_HOLES
-from shared_control_env.core.lateral_risk import lateral_risk
+from shared_control_env.controllers import Automation
+from shared_control_env.core.control import automation as automation_mpc
 from shared_control_env.core.parameters import LateralRiskParameters
 from shared_control_env.core.records import SAFE_AREA
-from shared_control_env.core.safe_area import BLOCKED, new_scratch, search_triangles, triangulate
+from shared_control_env.core.risk.corridor import new_scratch, search_triangles
+from shared_control_env.core.risk.lateral import lateral_risk
+from shared_control_env.core.risk.safe_area import BLOCKED
+from shared_control_env.core.risk.triangulation import MAX_HOLES, triangulate_any
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
+from tests import compiled
 
 
 def test_a_failing_automation_holds_its_last_command_and_is_counted():
@@ -17,16 +20,19 @@ def test_a_failing_automation_holds_its_last_command_and_is_counted():
     env.reset(seed=0)
     env.step(0)
     bare = env.unwrapped
-    act = bare.automation.act
 
-    def fail(scene):
-        z = scene["z"].copy()
-        scene["z"][1] = np.nan
-        solution = act(scene)
-        scene["z"] = z
-        return solution
+    class Blind(Automation):
+        """The automation, which does not know where it is."""
 
-    bare.automation.act = fail
+        blind = False
+
+        def act(self, scene):
+            scene["z"][1] = np.nan if self.blind else scene["z"][1]
+            return super().act(scene)
+
+    bare.automation = Blind(bare.parameters)
+    env.step(0)
+    bare.automation.blind = True
     _, _, _, _, before = env.step(0)
     for count in range(1, 11):
         _, _, terminated, truncated, info = env.step(0)
@@ -35,7 +41,7 @@ def test_a_failing_automation_holds_its_last_command_and_is_counted():
         assert info["automation"]["status"] == automation_mpc.FAILED
         assert info["automation"]["failures"] >= count
         np.testing.assert_array_equal(info["u_a_des"], before["u_a_des"])
-    bare.automation.act = act
+    bare.automation.blind = False
     env.step(0)
     assert env.step(0)[4]["automation"]["status"] != automation_mpc.FAILED
 
@@ -48,8 +54,6 @@ def test_a_blocked_corridor_is_reported_and_driven_on():
     load = bare._vehicle_class(bare.road, (40.0, 2.5), heading=0.0, speed=0.0)
     load.array[7] = 5.4
     bare.road.vehicles.append(load)
-    bare.road.update_rows()
-    bare._corners = np.zeros((1, 4, 2))
     outcomes = []
     for _ in range(30):
         _, _, terminated, _, info = env.step(0)
@@ -78,9 +82,11 @@ def test_more_vehicles_than_the_compiled_triangulation_takes():
     env.reset(seed=0)
     env.step({"driver": np.zeros(2), "authority": np.ones(1)})
     corners = np.zeros((10, 4, 2))
-    holes = single.sense(env.steps, env.vehicle.array, env.traffic, env.line, env.parameters, env.scene.copy(), corners)
+    holes = compiled.sense(
+        env.steps, env.vehicle.array, env.traffic, env.line, env.parameters, env.scene.copy(), corners
+    )
     assert holes > MAX_HOLES
-    triangles = triangulate(*env.scene["region"], corners[:holes])
+    triangles = triangulate_any(env.scene["region"], corners[:holes])
     area = np.zeros((), SAFE_AREA)[()]
     region, d = env.scene["region"], float(env.scene["z"][1])
     search_triangles(triangles, region[0], region[1], d, 2.0, new_scratch(len(triangles)), area)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from shared_control_env.envs.scenarios import scenario
+from shared_control_env.envs.environments import environment_class
 from shared_control_env.evaluation.episodes import Recorder, settings_of
 from shared_control_env.evaluation.metrics import measure_all
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
@@ -13,7 +13,7 @@ def drive_single(batch):
     ((degradation, seed),) = batch.episodes
     make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
     env = AuthorityLimiter(
-        scenario(batch.scenario)(settings_of(batch, degradation)), make_allocator() if make_allocator else None
+        environment_class(batch.scenario)(settings_of(batch, degradation)), make_allocator() if make_allocator else None
     )
     env = DriverModel(env, make_driver() if make_driver else None)
     env.reset(seed=seed)

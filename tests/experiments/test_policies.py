@@ -61,5 +61,5 @@ def test_what_ships_is_what_its_card_says():
             assert ",".join(each["environments"]) in card
             assert each["versions"] in card
             weights = {id: config["reward"] for id, config in each["config"].items()}
-            assert all(given == json.loads(json.dumps(TASKS[task].reward._asdict())) for given in weights.values())
+            assert all(given == json.loads(json.dumps(TASKS[task].reward)) for given in weights.values())
             assert np.isfinite(each["score"])

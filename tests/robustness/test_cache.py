@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shared_control_env.core import cache, jit
+from shared_control_env.core.compile import cache, jit
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -17,7 +17,7 @@ PROBE = """
 import sys, types
 package = types.ModuleType("shared_control_env"); package.__path__ = [sys.argv[1]]; sys.modules["shared_control_env"] = package
 import numpy as np
-from shared_control_env.core import driver_lag
+from shared_control_env.core.control import driver_lag
 from shared_control_env.core.parameters import DriverLagParameters
 if len(sys.argv) > 2: print("ready", flush=True); input()
 u = np.array([1.0, 0.0]); driver_lag.advance_lag(u, np.ones(2), np.zeros(2), 0.05, DriverLagParameters()); print(u[0])
@@ -46,7 +46,7 @@ def probe(folder, **more):
 
 
 def edit(folder):
-    path = folder / "core/driver_lag.py"
+    path = folder / "core/control/driver_lag.py"
     text = path.read_text()
     assert OLD in text
     path.write_text(text.replace(OLD, NEW))
@@ -61,7 +61,7 @@ def test_a_changed_equation_is_seen_and_the_old_one_found_again(sources):
     edit(sources)
     after, _ = probe(sources)
     assert after - before == pytest.approx(np.exp(-0.25))
-    path = sources / "core/driver_lag.py"
+    path = sources / "core/control/driver_lag.py"
     path.write_text(path.read_text().replace(NEW, OLD))
     again, said = probe(sources)
     assert (again, said) == (before, "")  # from the cache of the old sources

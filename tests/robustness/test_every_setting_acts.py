@@ -11,6 +11,7 @@ from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.settings import Settings
 from shared_control_env.envs.settings.checks import NOT_DRAWN
 from shared_control_env.wrappers import DriverModel
+from tests import extras
 
 # A scenario in which every section has something to do: a lane change in traffic that changes lanes and brakes, under
 # two faults, with the predictive driver at the wheel and the law that needs alpha_a.
@@ -77,6 +78,7 @@ BESIDE = {
     },
     "person.response": RESTING,
     "person.response_spread": RESTING,
+    "vehicle.mu": {"vehicle": {"tyre": extras.TYRE}},
     "internal_model.K_h": {"internal_model": {"active": True}},
     "internal_model.T_h": {"internal_model": {"active": True}},
 }
@@ -103,6 +105,16 @@ VALUES = {
     "task.target_speed": 5.0,
     "vehicle.l_r": 1.1,
     "vehicle.C_r": 70_000.0,
+    "vehicle.tyre": extras.TYRE,
+    "vehicle.mu": 0.2,
+    "model.m": 1500.0,
+    "model.I_z": 2000.0,
+    "model.l_f": 1.1,
+    "model.l_r": 1.2,
+    "model.C_f": 50_000.0,
+    "model.C_r": 90_000.0,
+    "observation.type": extras.OBSERVATION,
+    "reward_terms": [{"term": extras.TERM, "weight": 1.0}],
     "person.lane_position": 0.2,
     "person.heading": 0.003,
     "person.headway": 3.0,

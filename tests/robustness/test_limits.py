@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shared_control_env.controllers.automation import Automation
-from shared_control_env.core import automation_mpc
+from shared_control_env.core.control import automation as automation_mpc
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.wrappers import DriverModel

@@ -15,7 +15,8 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError
 
 import shared_control_env  # noqa: F401
-from shared_control_env.vector import environment, kernel
+from shared_control_env.core import kernel
+from shared_control_env.vector import environment
 from tests.vector.agreement import flat
 
 TWO_LANE = "SharedControl/TwoLane-v0"
@@ -226,7 +227,7 @@ def test_rendering_out_of_turn():
 def test_the_picture_stays_where_a_reset_leaves_environment_0_out():
     env = driven(TWO_LANE, steps=20, render_mode="rgb_array")
     before = env.render()[0]
-    viewer = env.unwrapped._viewer_env
+    viewer = env.unwrapped._pictures._viewer_env
     env.reset(options={"reset_mask": np.array([False, True, True, True])})
     np.testing.assert_array_equal(env.render()[0], before)
     closed = []

@@ -6,8 +6,8 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import shared_control_env  # noqa: F401
+from shared_control_env.envs.starts import write_start
 from shared_control_env.vector import environment
-from shared_control_env.vector.starts import write_start
 from tests.vector.agreement import assert_same_info, at, compare, gentle_driver
 
 TWO_LANE = "SharedControl/TwoLane-v0"

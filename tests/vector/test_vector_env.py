@@ -9,16 +9,15 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import shared_control_env  # noqa: F401
-from shared_control_env.core.authority import LAWS
-from shared_control_env.core.degradation import KINDS
-from shared_control_env.core.safe_area import BLOCKED
+from shared_control_env.core.authority.laws import LAWS
+from shared_control_env.core.faults.kinds import KINDS
+from shared_control_env.core.kernel import TAKEN_AT_ONCE
+from shared_control_env.core.risk.safe_area import BLOCKED
 from shared_control_env.envs import TwoLaneEnv
-from shared_control_env.envs.cases import TWO_LANE as CASE
-from shared_control_env.envs.degradations import DEGRADATIONS, NOISES
-from shared_control_env.envs.settings import WITHOUT_SIZE
+from shared_control_env.envs.degradations import DEGRADATIONS
+from shared_control_env.envs.scenarios import TWO_LANE as SCENARIO
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.vector.environment import SharedControlVectorEnv
-from shared_control_env.vector.kernel import TAKEN_AT_ONCE
 from shared_control_env.wrappers import DriverModel
 from tests.vector.agreement import assert_same_info, at, compare, flat, gentle_driver, random_driver
 
@@ -69,10 +68,10 @@ def test_same_where_the_lane_is_narrower_than_the_vehicle(config):
     compare(single, many, gentle_driver)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS[1:] if kind not in WITHOUT_SIZE])
+@pytest.mark.parametrize("kind", [kind.name for kind in KINDS.values() if kind.unit is not None])
 def test_same_in_episodes_that_begin_anew_under_a_degradation(kind):
     # What a degradation remembers of one episode must not act in the next.
-    fault = {"kind": kind, "onset": 0.0, "size": 0.1, **({"seed": 1} if kind in NOISES else {})}
+    fault = {"kind": kind, "onset": 0.0, "size": 0.1, **({"seed": 1} if KINDS[kind].draws else {})}
     config = {"faults": [fault], "duration": 0.6, "authority": {"law": "none"}}
     single, many = gym.make(TWO_LANE, config=config), gym.make_vec(TWO_LANE, num_envs=3, config=config)
     assert compare(single, many, random_driver, episodes=3) == [12, 12, 12]
@@ -134,7 +133,7 @@ def test_a_drawn_episode_is_shown_as_it_is():
     for _ in range(6):
         env.step(np.zeros((2, 2)))
     assert env.render()[0].shape == first.shape
-    assert env.unwrapped._viewer_env.settings.road == env.unwrapped.episodes[-1].road
+    assert env.unwrapped._pictures._viewer_env.settings.road == env.unwrapped.episodes[-1].road
 
 
 @pytest.mark.parametrize("name", IDS)
@@ -154,8 +153,9 @@ def test_same_where_vehicles_reach_into_the_driving_region():
     start[:, 2] += (0.05, -0.1, 0.0)
     place = single.unwrapped._place_vehicles
 
-    def place_across(situation):
-        place(situation._replace(traffic=start))
+    def place_across():
+        single.unwrapped._batch.traffic[0] = start
+        place()
         for vehicle, row in zip(single.unwrapped.road.vehicles[1:], start, strict=True):
             vehicle.array[:] = row
 
@@ -383,7 +383,7 @@ def test_refused(call, message):
 )
 def test_wrong_construction(options, message):
     with pytest.raises(ValueError, match=message):
-        SharedControlVectorEnv(CASE, **options)
+        SharedControlVectorEnv(SCENARIO, **options)
 
 
 def test_stepping_before_a_reset():
@@ -404,4 +404,4 @@ def test_starts_without_highway_env():
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_memory_of_an_environment(name):
     env = gym.make_vec(name, num_envs=64).unwrapped
-    assert sum(array.nbytes for array in env._batch) / 64 == env.bytes_per_environment <= 4096
+    assert sum(array.nbytes for array in env._batch) // 64 == env.bytes_per_environment <= 4608

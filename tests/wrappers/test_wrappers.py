@@ -6,7 +6,7 @@ from gymnasium import spaces
 import shared_control_env  # noqa: F401
 from shared_control_env.controllers.allocators import FixedAuthority
 from shared_control_env.controllers.solution import Solution
-from shared_control_env.core.fuzzy import authority
+from shared_control_env.core.authority.fuzzy import authority
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel, open_slots
 
@@ -123,7 +123,7 @@ def test_the_limiter_can_be_left_out():
     np.testing.assert_array_equal(limited.reset(seed=0)[0], plain.reset(seed=0)[0])
     np.testing.assert_array_equal(limited.step(np.zeros(2))[0], plain.step(np.zeros(2))[0])
     assert open_slots(gym.make(env.spec)) == ("driver", "authority")
-    with pytest.raises(ValueError, match="limiter = 'fuzzy' must be True or False"):
+    with pytest.raises(ValueError, match="allocator = 'fuzzy' must be an object"):
         gym.make("SharedControl/TwoLane-v0", limiter="fuzzy")
 
 

@@ -1,7 +1,7 @@
 """Settings of an environment: their schema, changes to them, their check, and what the core takes of them."""
 
 from shared_control_env.envs.settings.changes import ReadOnly, as_plain, change, difference, merge
-from shared_control_env.envs.settings.checks import CUT_OFF, LEAD_IN, WITHOUT_SIZE, assigned, check
+from shared_control_env.envs.settings.checks import CUT_OFF, LEAD_IN, assigned, check
 from shared_control_env.envs.settings.schema import OWN_TRAFFIC, RandomSettings, Settings, plain
 from shared_control_env.envs.settings.to_core import fault_records, parameters_of, plan_records
 
@@ -9,7 +9,6 @@ __all__ = [
     "CUT_OFF",
     "LEAD_IN",
     "OWN_TRAFFIC",
-    "WITHOUT_SIZE",
     "RandomSettings",
     "ReadOnly",
     "Settings",

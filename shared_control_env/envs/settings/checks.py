@@ -4,26 +4,18 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from shared_control_env.core import parameters as core
+from shared_control_env.core.faults.kinds import KINDS, LENGTH, RATE, SHARE, TIME, Kind
 from shared_control_env.core.records import MAX_DELAY
-from shared_control_env.envs.degradations import NOISES
 from shared_control_env.envs.settings.changes import at
 from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings, plain
 from shared_control_env.nearest import hint, nearest
-
-SHARES, TIMES = ("loss_of_effectiveness", "saturation"), ("delay",)
-"""Kinds of degradation whose size is a share in [0, 1], and a time."""
-
-WITHOUT_SIZE = ("stuck", "drop_out", "sign_error", "missed_lead")
-"""Kinds of degradation that have no size."""
-
-PERCEPTUAL = {"lane_offset": ("steering",), "missed_lead": ("steering", "acceleration")}
-"""Kinds that concern the perception, and the channels that may be named with them, where the name has no effect."""
 
 LEAD_IN = 50.0
 """Straight road behind the ego's start [m]."""
@@ -129,37 +121,34 @@ def _check_time(settings: Settings) -> None:
 def _check_faults(settings: Settings) -> None:
     """Sizes that their kinds allow, and nothing that a kind does not heed."""
     for i, fault in enumerate(settings.faults):
-        name = f"config['faults'][{i}]"
-        for field, kinds in (("size", None), ("time_constant", ("coloured_noise",)), ("frequency", ("oscillation",))):
-            heeded = fault.kind not in WITHOUT_SIZE if kinds is None else fault.kind in kinds
-            _refuse_idle(name, fault, field, heeded, f"{fault.kind} has none")
-        _refuse_idle(name, fault, "seed", fault.kind in NOISES, f"{fault.kind} draws nothing")
+        name, kind = f"config['faults'][{i}]", KINDS[fault.kind]
+        _refuse_idle(name, fault, "size", kind.unit is not None, f"{fault.kind} has none")
+        for field in ("time_constant", "frequency"):
+            _refuse_idle(name, fault, field, field in kind.heeds, f"{fault.kind} has none")
+        _refuse_idle(name, fault, "seed", kind.draws, f"{fault.kind} draws nothing")
         _refuse_idle(name, fault, "duty", fault.period > 0.0, "it needs a 'period'")
-        if fault.channel not in PERCEPTUAL.get(fault.kind, (fault.channel,)):
+        if fault.channel not in kind.channels:
             raise ValueError(f"{name}['channel'] = {fault.channel!r}: {fault.kind} acts on no channel; leave it out")
-        if fault.kind in WITHOUT_SIZE:
+        if kind.unit is None:
             continue
         if fault.size is None:
             raise ValueError(f"{name}['size'] is missing; {fault.kind} needs one")
-        low, high = _sizes(fault, settings)
+        low, high = _sizes(kind, fault, settings)
         if not low <= fault.size <= high:
             raise ValueError(f"{name}['size'] = {fault.size} must lie in [{low:g}, {high:g}] for {fault.kind}")
 
 
-def _sizes(fault: FaultSettings, settings: Settings) -> tuple[float, float]:
+def _sizes(kind: Kind, fault: FaultSettings, settings: Settings) -> tuple[float, float]:
     """Range of a fault's size: beyond its ends no command, whatever the limits, is any more degraded."""
     bound = core.LARGEST_ACCELERATION if fault.channel == "acceleration" else core.LARGEST_STEERING
-    if fault.kind in SHARES:
-        return 0.0, 1.0
-    if fault.kind in TIMES:
-        return 0.0, (MAX_DELAY - 1) / settings.policy_frequency
-    if fault.kind == "rate_limit":
-        return 0.0, 2.0 * bound * settings.policy_frequency
-    if fault.kind in NOISES:
-        return 0.0, 2.0 * bound
-    if fault.kind == "lane_offset":
-        return -LARGEST_OFFSET, LARGEST_OFFSET
-    return -2.0 * bound, 2.0 * bound
+    largest = {
+        SHARE: 1.0,
+        TIME: (MAX_DELAY - 1) / settings.policy_frequency,
+        RATE: 2.0 * bound * settings.policy_frequency,
+        LENGTH: LARGEST_OFFSET,
+    }.get(kind.unit or "", 2.0 * bound)
+    one_sided = kind.unit in (SHARE, TIME, RATE) or kind.draws  # a standard deviation has no sign
+    return 0.0 if one_sided else -largest, largest
 
 
 def _refuse_idle(name: str, section: BaseModel, field: str, heeded: bool, reason: str) -> None:
@@ -273,7 +262,7 @@ def _check_places(settings: Settings) -> None:
 
 def _check_vehicle(settings: Settings) -> None:
     """Stable at the speeds of the task; a warning where it would not be at motorway speed."""
-    vehicle = core.VehicleParameters(**settings.vehicle.model_dump())
+    vehicle = core.VehicleParameters(**settings.vehicle.model_dump(exclude={"tyre"}))
     critical = core.critical_speed(vehicle)
     fastest = max(settings.ego.speed, settings.task.target_speed)
     what = (
@@ -288,6 +277,11 @@ def _check_vehicle(settings: Settings) -> None:
 
 def _check_idle(settings: Settings) -> None:
     """Nothing that is set and would not act beside the other settings."""
+    reason = "the tyres are linear, and know no friction"
+    _refuse_idle("config['vehicle']", settings.vehicle, "mu", settings.vehicle.tyre != "linear", reason)
+    repeated = [name for name, count in Counter(settings.terms).items() if count > 1]
+    if repeated:
+        raise ValueError(f"config['reward_terms'] names {repeated[0]!r} more than once")
     own = settings.other_vehicles_type == OWN_TRAFFIC
     for i, vehicle in enumerate(settings.vehicles):
         name = f"config['vehicles'][{i}]"

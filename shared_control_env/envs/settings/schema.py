@@ -8,19 +8,26 @@ list of them.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from annotated_types import Interval, MaxLen, MinLen
-from pydantic import BaseModel, BeforeValidator, ConfigDict, create_model
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, create_model
+from pydantic_core import PydanticCustomError
 
 from shared_control_env.core import parameters as core
-from shared_control_env.core.authority import LAWS
-from shared_control_env.core.degradation import KINDS, PLACES
-from shared_control_env.core.fuzzy import OPERATORS
-from shared_control_env.core.parameters import Fraction, NonNegative, Positive, Speed, TargetSpeed
+from shared_control_env.core.authority.fuzzy import OPERATORS
+from shared_control_env.core.authority.laws import LAWS
+from shared_control_env.core.faults.command import PLACES
+from shared_control_env.core.faults.kinds import KINDS
+from shared_control_env.core.feedback.observation import DRIVER_V0, OBSERVATIONS
+from shared_control_env.core.feedback.reward import STANDARD, TERMS
+from shared_control_env.core.parameters import Fraction, NonNegative, Positive, Speed, TargetSpeed, Weight
+from shared_control_env.core.records import MAX_TERMS
+from shared_control_env.core.world.tyre import TYRES
 from shared_control_env.envs.degradations import DEGRADATIONS
 
-OWN_TRAFFIC = "shared_control_env.envs.vehicles.LaneFollower"
+OWN_TRAFFIC = "shared_control_env.envs.highway.vehicles.LaneFollower"
 """Traffic that the core drives, by its plans."""
 
 LONGEST = 3600.0
@@ -47,6 +54,24 @@ Seed = Annotated[int, Interval(ge=0, lt=2**63), BeforeValidator(_whole)]
 
 def _count(largest: int, smallest: int = 1) -> Any:
     return Annotated[int, Interval(ge=smallest, le=largest), BeforeValidator(_whole)]
+
+
+def name_in(table: Mapping[str, Any], *but: str) -> Any:
+    """A name of a table that others may add to.
+
+    Args:
+        table: entries by name.
+        but: names that are not allowed here.
+    """
+
+    def check(name: str) -> str:
+        names = [each for each in table if each not in but]
+        if name not in names:
+            expected = ", ".join(map(repr, names))
+            raise PydanticCustomError("literal_error", "input should be one of {expected}", {"expected": expected})
+        return name
+
+    return Annotated[str, AfterValidator(check)]
 
 
 class Section(BaseModel):
@@ -102,7 +127,7 @@ class BrakeSettings(Section):
 
 
 class LaneChangeSettings(Section):
-    """A move over to another lane (core.lane_change)."""
+    """A move over to another lane (core.world.lane_change)."""
 
     onset: Onset  # [s]
     duration: Annotated[float, Interval(ge=0.1, le=100.0)] = 4.0  # [s]
@@ -110,7 +135,7 @@ class LaneChangeSettings(Section):
 
 
 class VehicleSettings(Section):
-    """Another vehicle at its start; positions are those of the centres, relative to the ego's (core.traffic)."""
+    """Another vehicle at its start; positions are those of the centres, relative to the ego's (core.world.traffic)."""
 
     lane: Lane
     position: Annotated[float, Interval(ge=-core.LONGEST_ROAD, le=core.LONGEST_ROAD)]  # along the road [m]
@@ -122,9 +147,9 @@ class VehicleSettings(Section):
 
 
 class FaultSettings(Section):
-    """A degradation of the automation (core.degradation); what its size means depends on its kind."""
+    """A degradation of the automation (core.faults); what its size means depends on its kind."""
 
-    kind: Literal[KINDS[1:]] = "bias"
+    kind: name_in(KINDS, "none") = "bias"
     channel: Literal["acceleration", "steering", "both"] = "steering"
     onset: Onset  # [s]
     ramp: NonNegative = 0.0  # [s]
@@ -149,7 +174,7 @@ class RandomSettings(Section):
 
 
 class AuthoritySettings(Section):
-    """Authority of the automation (core.authority, core.fuzzy)."""
+    """Authority of the automation (core.authority)."""
 
     law: Literal[LAWS] = "paper"
     operators: Literal[OPERATORS] = "product-sum"
@@ -157,7 +182,7 @@ class AuthoritySettings(Section):
 
 
 class InternalModelSettings(Section):
-    """Whether the predictive driver knows its own response (core.driver_qp), and what it believes of it."""
+    """Whether the predictive driver knows its own response (core.control.driver), and what it believes of it."""
 
     active: bool = False
     K_h: Annotated[float, Interval(ge=0.0, le=100.0)] | None = None  # [-]; None for that of driver_lag
@@ -171,6 +196,30 @@ class SolverSettings(Section):
     first_iterations: _count(100) = 5
 
 
+class ModelSettings(Section):
+    """The car as controllers, person and risk assessment take it to be, with linear tyres; None for what it is."""
+
+    m: core.Mass | None = None  # [kg]
+    I_z: core.Inertia | None = None  # [kg m^2]
+    l_f: core.BodyLength | None = None  # [m]
+    l_r: core.BodyLength | None = None  # [m]
+    C_f: core.Stiffness | None = None  # [N/rad]
+    C_r: core.Stiffness | None = None  # [N/rad]
+
+
+class ObservationSettings(Section):
+    """What the environment gives to see (core.feedback.observation)."""
+
+    type: name_in(OBSERVATIONS) = DRIVER_V0.name
+
+
+class TermSettings(Section):
+    """A term of the reward beside the standard ones (core.feedback.reward)."""
+
+    term: name_in(TERMS, *STANDARD)
+    weight: Weight
+
+
 _TASK_FROM_ROAD = (
     *("dt", "lane_width", "road_high", "road_end", "y_target", "y_goal"),
     *("change_onset", "change_duration"),
@@ -182,7 +231,7 @@ _Longitudinal = _section(
     preset=(Literal["paper", "graded"], "graded"),
 )
 _Task = _section("_Task", core.TaskParameters, *_TASK_FROM_ROAD)
-_Vehicle = _section("_Vehicle", core.VehicleParameters)
+_Vehicle = _section("_Vehicle", core.VehicleParameters, "tyre", tyre=(name_in(TYRES), "linear"))
 _Limits = _section("_Limits", core.Limits)
 _Automation = _section("_Automation", core.PredictiveParameters)
 _Driver = _section("_Driver", core.PredictiveParameters, "R")  # the driver's cost has no potential field
@@ -190,7 +239,13 @@ _SafeArea = _section("_SafeArea", core.SafeAreaParameters)
 _Lateral = _section("_Lateral", core.LateralRiskParameters)
 _Law = _section("_Law", core.LawParameters)
 _Lag = _section("_Lag", core.DriverLagParameters)
-_Reward = _section("_Reward", core.RewardParameters)
+_Reward: Any = create_model(
+    "_Reward",
+    __base__=Section,
+    __module__=__name__,
+    __doc__="Weights of the standard terms of the reward (core.feedback.reward).",
+    **{name: (Weight, TERMS[name].weight) for name in STANDARD},
+)
 _Person = _section("_Person", core.PersonParameters, "seed", seed=(Seed | None, None))  # None to have it drawn
 
 
@@ -214,9 +269,9 @@ class Settings(Section):
     lane_change: LaneChangeSettings | None = None  # of the ego; None to keep the lane
     vehicles: Annotated[list[VehicleSettings], MaxLen(100)] = []
     faults: Annotated[list[FaultSettings], MaxLen(20)] = []
-    fault_at: Literal[PLACES] = "command"  # where degradations of the command act (core.degradation)
+    fault_at: Literal[PLACES] = "command"  # where degradations of the command act (core.faults)
     misperception: Literal["automation", "shared"] = "automation"  # whose: the monitor may share the automation's
-    degradations: list[Literal[tuple(DEGRADATIONS)]] = []  # one of these is drawn at the start of each episode
+    degradations: list[name_in(DEGRADATIONS)] = []  # one of these is drawn at the start of each episode
     randomise: Annotated[list[RandomSettings], MaxLen(1000)] = []
     task: _Task = _Task()
     authority: AuthoritySettings = AuthoritySettings()
@@ -232,7 +287,15 @@ class Settings(Section):
     person: _Person = _Person()
     limits: _Limits = _Limits()
     vehicle: _Vehicle = _Vehicle()
+    model: ModelSettings = ModelSettings()
+    observation: ObservationSettings = ObservationSettings()
     reward: _Reward = _Reward()
+    reward_terms: Annotated[list[TermSettings], MaxLen(MAX_TERMS - len(STANDARD))] = []
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the reward's terms, in order."""
+        return (*STANDARD, *(entry.term for entry in self.reward_terms))
 
     @property
     def steps(self) -> int:

@@ -9,10 +9,14 @@ import numpy as np
 from pydantic import BaseModel
 
 from shared_control_env.core import parameters as core
-from shared_control_env.core.authority import LAWS
-from shared_control_env.core.degradation import KINDS, PLACES
-from shared_control_env.core.fuzzy import OPERATORS
-from shared_control_env.core.records import pack, record_dtype
+from shared_control_env.core.authority.fuzzy import OPERATORS
+from shared_control_env.core.authority.laws import LAWS
+from shared_control_env.core.faults import kinds
+from shared_control_env.core.faults.command import PLACES
+from shared_control_env.core.faults.kinds import COMMAND, KINDS, RATE
+from shared_control_env.core.feedback.reward import TERMS, VALUE
+from shared_control_env.core.records import MAX_TERMS, pack, record_dtype
+from shared_control_env.core.world import tyre
 from shared_control_env.envs.settings.schema import Settings
 
 
@@ -26,7 +30,8 @@ def parameters_of(settings: Settings) -> core.Parameters:
     longitudinal["graded"] = longitudinal.pop("preset") == "graded"
     width, change = settings.road.lane_width, settings.lane_change
     return core.Parameters(
-        vehicle=core.VehicleParameters(**values(settings.vehicle)),
+        vehicle=core.VehicleParameters(**values(settings.vehicle, tyre=tyre.address_of(settings.vehicle.tyre))),
+        model=model_of(settings),
         limits=core.Limits(**values(settings.limits)),
         automation=core.PredictiveParameters(**values(settings.automation)),
         driver=core.PredictiveParameters(**values(settings.driver)),
@@ -41,7 +46,7 @@ def parameters_of(settings: Settings) -> core.Parameters:
             T_h=settings.driver_lag.T_h if settings.internal_model.T_h is None else settings.internal_model.T_h,
         ),
         person=core.PersonParameters(**values(settings.person, seed=settings.person.seed or 0)),
-        reward=core.RewardParameters(**values(settings.reward)),
+        reward=reward_of(settings),
         task=core.TaskParameters(
             **values(settings.task),
             dt=1.0 / settings.policy_frequency,
@@ -59,18 +64,48 @@ def parameters_of(settings: Settings) -> core.Parameters:
             fault_at=PLACES.index(settings.fault_at),
             strict=settings.authority.strict,
             shared=settings.misperception == "shared",
-            **values(settings.solver),
         ),
+        solver=core.SolverParameters(**values(settings.solver)),
     )
+
+
+def model_of(settings: Settings) -> core.VehicleParameters:
+    """The car as the controllers take it to be.
+
+    Args:
+        settings: checked.
+    """
+    believed = settings.model.model_dump(exclude_none=True)
+    return core.VehicleParameters(**{**settings.vehicle.model_dump(), "tyre": 0, **believed})
+
+
+def reward_of(settings: Settings) -> core.RewardParameters:
+    """The reward's terms, where their functions are, and what they weigh.
+
+    Args:
+        settings: checked.
+    """
+    given = {entry.term: entry.weight for entry in settings.reward_terms}
+    weights = {**settings.reward.model_dump(), **given}
+    addresses, values = np.zeros(MAX_TERMS, dtype=np.int64), np.zeros(MAX_TERMS)
+    for i, (name, weight) in enumerate(weights.items()):
+        addresses[i], values[i] = VALUE.address(TERMS[name].value), weight
+    return core.RewardParameters(len(weights), addresses, values)
 
 
 def fault_records(settings: Settings) -> np.ndarray:
     """Faults as records of :class:`core.DegradationParameters`, shape (n,)."""
     records = np.zeros(len(settings.faults), record_dtype(core.DegradationParameters))
     for i, fault in enumerate(settings.faults):
+        kind = KINDS[fault.kind]
+        act, perceive, advance = kinds.addresses(kind)
         records[i] = pack(
             core.DegradationParameters(
-                kind=KINDS.index(fault.kind),
+                kind=list(KINDS).index(fault.kind),
+                act=act,
+                perceive=perceive,
+                advance=advance,
+                in_unit_of_channel=kind.unit in (COMMAND, RATE),
                 acceleration=fault.channel != "steering",
                 steering=fault.channel != "acceleration",
                 onset=fault.onset,

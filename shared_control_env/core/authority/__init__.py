@@ -1,0 +1,1 @@
+"""From the risks to the automation's actual command (Section IV)."""

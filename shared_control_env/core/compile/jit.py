@@ -1,0 +1,159 @@
+"""The one numba decorator of the core: its disk cache, and the notice that a cold compilation gives."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from time import perf_counter
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numba import config, njit, types
+from numba.core import event
+
+from shared_control_env.core.compile.cache import cache_of, say_once
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def jit(function: F) -> F:
+    """Compile with a disk cache.
+
+    Divisions follow IEEE 754 as in NumPy. Neither fast-math nor threads are used within a function, so
+    that rollouts repeat to the bit.
+    """
+    return _compile(function, inline="never")
+
+
+def jit_allocating(function: F) -> F:
+    """As :func:`jit`, for a function that makes arrays."""
+    return _compile(function, inline="never", allocating=True)
+
+
+def jit_inlined(function: F) -> F:
+    """As :func:`jit`, for a function that one or two others call: it is compiled as a part of them.
+
+    LLVM optimises all that a function calls anew for each of its callers, so that every layer of a deep
+    composition would cost as much to compile as the whole.
+    """
+    return _compile(function, inline="always")
+
+
+def _compile(function: F, inline: str, allocating: bool = False) -> F:
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "nogil": True,
+        "inline": inline,
+        "no_cfunc_wrapper": True,
+        # Arrays are made nowhere in the step path, so that nobody needs to count who holds them.
+        "_nrt": allocating,
+        # A private function is never called from Python, so it needs no entry for that.
+        "no_cpython_wrapper": function.__name__.startswith("_"),
+    }
+    if is_interpreted():
+        return _interpreted(function)
+    dispatcher: Any = njit(**options)(function)
+    _ignore_literals(dispatcher)
+    dispatcher._cache = cache_of(function)
+    return cast(F, dispatcher)
+
+
+def is_interpreted() -> bool:
+    """Whether the core runs as Python, since the environment variable ``NUMBA_DISABLE_JIT`` is set."""
+    settings: Any = config
+    return bool(settings.DISABLE_JIT)
+
+
+def _interpreted(function: F) -> F:
+    """The function as Python, for debuggers (``NUMBA_DISABLE_JIT=1``): fields of records are attributes there too."""
+    say_once("NUMBA_DISABLE_JIT is set: the core runs as Python, some thousand times slower.")
+
+    @wraps(function)
+    def interpreted(*arguments: Any) -> Any:
+        with np.errstate(all="ignore"):
+            return function(*(_with_attributes(argument) for argument in arguments))
+
+    interpreted.py_func = function  # type: ignore[attr-defined]
+    return cast(F, interpreted)
+
+
+_RECORD: Any = np.record
+
+
+class _Fields(_RECORD):
+    """A record whose fields are attributes, those too that NumPy has another meaning for, such as ``size``."""
+
+    def __getattribute__(self, name: str) -> Any:
+        fields = object.__getattribute__(self, "dtype").fields
+        return _with_attributes(self[name]) if name in fields else object.__getattribute__(self, name)
+
+
+def _with_attributes(argument: Any) -> Any:
+    """A view of a record or of an array of them whose fields are attributes; of those in a named tuple, too."""
+    if isinstance(argument, tuple) and hasattr(argument, "_fields"):
+        return type(argument)(*map(_with_attributes, argument))
+    if isinstance(argument, np.void | np.ndarray) and argument.dtype.names and argument.dtype.type is not _Fields:
+        return argument.view(np.dtype((_Fields, argument.dtype)))
+    return argument
+
+
+def _ignore_literals(dispatcher: Any) -> None:
+    """Have compiled callers share one specialisation for a constant and a variable of the same type."""
+    call_template = dispatcher.get_call_template
+
+    def get_call_template(args: Any, kws: Any) -> Any:
+        return call_template(
+            [types.unliteral(arg) for arg in args], {name: types.unliteral(arg) for name, arg in kws.items()}
+        )
+
+    dispatcher.get_call_template = get_call_template
+
+
+def is_cached(function: Callable[..., Any]) -> bool:
+    """Whether numba's cache on disk holds a compiled form of a function of this package."""
+    dispatcher: Any = function
+    module, name = dispatcher.py_func.__module__.rsplit(".", 1)[-1], dispatcher.py_func.__qualname__
+    path = dispatcher.stats.cache_path
+    return path is not None and any(Path(path).glob(f"{module}.{name}-*.nbi"))
+
+
+class _Compilation(event.Listener):
+    """Say on stderr that something is compiled for the first time, once for all that is compiled in a row.
+
+    The garbage collector rests meanwhile: numba makes millions of objects that live until the end, and looking
+    through them again and again takes a tenth of the time.
+    """
+
+    quiet_since = -float("inf")
+    depth = 0
+    collecting = False
+
+    def on_start(self, event: Any) -> None:
+        """Note that a compilation begins, perhaps within another."""
+        function = event.data["dispatcher"].py_func
+        pause = perf_counter() - self.quiet_since
+        if self.depth == 0:
+            self.collecting = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+        if pause > 5.0 and function.__module__.startswith("shared_control_env") and sys.stderr is not None:
+            print(
+                "shared_control_env: compiling the numerical core for this use and machine, once "
+                "(up to a minute); later runs read it from numba's cache.",
+                file=sys.stderr,
+                flush=True,
+            )
+        self.quiet_since = perf_counter()
+
+    def on_end(self, event: Any) -> None:
+        """Note that a compilation has ended just now."""
+        self.depth -= 1
+        if self.depth == 0 and self.collecting:
+            gc.enable()
+        self.quiet_since = perf_counter()
+
+
+event.register("numba:compile", _Compilation())

@@ -1,0 +1,145 @@
+"""The predictive driver as the kernel runs it: the program of :mod:`control.driver` by the active-set method."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+
+from shared_control_env.core.compile.calls import Interface
+from shared_control_env.core.compile.jit import jit_inlined
+from shared_control_env.core.control.condensing import Workspace
+from shared_control_env.core.control.driver import build_program, count_rows
+from shared_control_env.core.control.person import take_in, with_arm_noise
+from shared_control_env.core.control.qp import active_set
+from shared_control_env.core.control.qp.active_set import MAX_ROWS, MAX_VARIABLES, SOLVED, solve_qp
+from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import Memory, PersonMemory, Scene, Vector2, record_dtype
+
+
+class Program:
+    """The driver's quadratic program, and what it is solved in.
+
+    Attributes:
+        active_set: scratch of its solver.
+        P, q, A, low, high: the program, see :func:`control.driver.build_program`.
+        x: its solution.
+        multipliers: of its rows.
+        seen: the scene as a person sees it.
+        command: the driver's, ``[a, delta]`` [m/s^2, rad].
+    """
+
+    active_set: active_set.Workspace
+    P: Annotated[np.ndarray, (MAX_VARIABLES, MAX_VARIABLES)]
+    q: Annotated[np.ndarray, (MAX_VARIABLES,)]
+    A: Annotated[np.ndarray, (MAX_ROWS, MAX_VARIABLES)]
+    low: Annotated[np.ndarray, (MAX_ROWS,)]
+    high: Annotated[np.ndarray, (MAX_ROWS,)]
+    x: Annotated[np.ndarray, (MAX_VARIABLES,)]
+    multipliers: Annotated[np.ndarray, (MAX_ROWS,)]
+    seen: Scene
+    command: Vector2
+
+
+PROGRAM = record_dtype(Program)
+
+
+class DriverReport:
+    """How the driver came to the command, as ``info["driver"]``: its solver, and the person.
+
+    Attributes:
+        status: active_set.SOLVED, ITERATION_LIMIT or FAILED.
+        iterations: rows added and dropped.
+        primal_residual, dual_residual: of the program.
+        failures: steps so far at which the last command was held.
+        engaged: whether a person drives; else the hands rest.
+        noticed: when a person at rest noticed something [s]; infinite before.
+        reason: what it was, index in person.REASONS.
+    """
+
+    status: int
+    iterations: int
+    primal_residual: float
+    dual_residual: float
+    failures: int
+    engaged: bool
+    noticed: float
+    reason: int
+
+
+DRIVER_REPORT = record_dtype(DriverReport)
+
+
+@jit_inlined
+def clear_report(engaged: bool, report: DriverReport) -> None:
+    """Report of a driver that has not driven.
+
+    Args:
+        engaged: whether the driver drives from the start.
+        report: record of :data:`DRIVER_REPORT`.
+    """
+    report.status, report.iterations, report.failures = 0, 0, 0
+    report.primal_residual, report.dual_residual = 0.0, 0.0
+    report.engaged, report.noticed, report.reason = engaged, np.inf, 0
+
+
+def drive(
+    scene: Scene,
+    p: Parameters,
+    memory: Memory,
+    person: PersonMemory,
+    work: Workspace,
+    program: Program,
+    report: DriverReport,
+) -> None:
+    """The predictive driver's command (Eq. 15), or a person's, left in ``program.command``.
+
+    Hands that rest follow what they feel of the automation. When the solver fails the last command is held and the
+    failure counted.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+        p: parameters.
+        memory: record of :data:`records.MEMORY`.
+        person: record of :data:`records.PERSON_MEMORY`.
+        work: record of :data:`condensing.WORKSPACE`.
+        program: record of :data:`PROGRAM`.
+        report: record of :data:`DRIVER_REPORT`, written.
+    """
+    if not p.person.active:
+        report.engaged, report.noticed, report.reason = True, np.inf, 0
+        _solve(scene, p, memory, work, program, report)
+        return
+    program.seen = scene
+    if take_in(scene, memory.u, person, p, program.seen):
+        _solve(program.seen, p, memory, work, program, report)
+        with_arm_noise(program.command, person, p)
+    else:
+        program.command[0], program.command[1] = scene.felt[0], scene.felt[1]
+        report.status, report.iterations, report.failures = SOLVED, 0, memory.driver_failures
+        report.primal_residual, report.dual_residual = 0.0, 0.0
+    report.engaged, report.noticed, report.reason = person.engaged, person.noticed, person.reason
+
+
+@jit_inlined
+def _solve(
+    scene: Scene, p: Parameters, memory: Memory, work: Workspace, program: Program, report: DriverReport
+) -> None:
+    """The program of a scene as the driver sees it; arguments as those of :func:`drive`."""
+    g = program
+    build_program(scene, memory.u_h_des, memory.u_h_act, p, work, g.P, g.q, g.A, g.low, g.high)
+    n, m = 2 * p.driver.H_c + 1, count_rows(p)
+    status, iterations, primal, dual = solve_qp(n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set)
+    if status == SOLVED and np.isfinite(g.x[0] + g.x[1]):
+        g.command[0] = min(max(g.x[0], -1.0), 1.0) * p.limits.a_max
+        g.command[1] = min(max(g.x[1], -1.0), 1.0) * p.limits.delta_max
+    else:
+        g.command[0], g.command[1] = memory.u_h_des[0], memory.u_h_des[1]
+        memory.driver_failures += 1
+    report.status, report.iterations = status, iterations
+    report.primal_residual, report.dual_residual = primal, dual
+    report.failures = memory.driver_failures
+
+
+DRIVE = Interface(None, Scene, Parameters, Memory, PersonMemory, Workspace, Program, DriverReport)
+"""``drive(scene, p, memory, person, work, program, report)``, compiled apart from the loop."""

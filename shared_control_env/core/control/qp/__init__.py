@@ -1,0 +1,1 @@
+"""Solvers of the controllers' quadratic programs."""

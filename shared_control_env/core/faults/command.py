@@ -1,0 +1,134 @@
+"""Degradations of the automation's command (Eq. 17, 18 and kinds of our own), each of a kind of :mod:`faults.kinds`.
+
+Every degradation grows over a ramp from its onset on, lasts for a duration, and may come and go.
+"""
+
+from __future__ import annotations
+
+from math import floor
+
+import numpy as np
+
+from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.faults.kinds import ACT, ADVANCE, Acting
+from shared_control_env.core.parameters import DegradationParameters, Limits
+from shared_control_env.core.records import MAX_DELAY, FaultMemory
+
+CHANNELS = ("acceleration", "steering")
+"""Names of the command's channels, in the order of every command array ``[a, delta]``."""
+
+PLACES = ("planner", "command", "actuator")
+"""Where degradations of the command act; a place's index is its code.
+
+``planner``: u_a,des itself is wrong, and nobody knows what it should be. ``command``: between the automation and the
+limiter, which knows u_a,des; the paper's. ``actuator``: on u_a,act, whatever the limiter has made of it.
+"""
+
+PLANNER, COMMAND, ACTUATOR = range(3)
+
+_act, _advance = ACT.call, ADVANCE.call
+
+
+@jit
+def has_set_in(fault: DegradationParameters, t: float) -> bool:
+    """Whether a degradation is there; one that comes and goes is there throughout.
+
+    Args:
+        fault: the degradation.
+        t: time [s].
+    """
+    return fault.kind != 0 and fault.onset <= t < fault.onset + fault.duration
+
+
+@jit
+def severity(fault: DegradationParameters, t: float) -> float:
+    """Share of its full size that a degradation has at time t.
+
+    ``g = min((t - onset) / ramp, 1)`` from onset to onset + duration; a step where ramp is 0; and 0 in the
+    rest of every period of one that comes and goes, after the first ``duty period``.
+
+    Args:
+        fault: the degradation.
+        t: time [s].
+
+    Returns:
+        g in [0, 1].
+    """
+    if not has_set_in(fault, t):
+        return 0.0
+    elapsed = t - fault.onset
+    if fault.period > 0.0 and elapsed - fault.period * floor(elapsed / fault.period) >= fault.duty * fault.period:
+        return 0.0
+    return 1.0 if elapsed >= fault.ramp else elapsed / fault.ramp
+
+
+@jit
+def clear_faults(memories: np.ndarray) -> None:
+    """Forget that any degradation has acted.
+
+    Args:
+        memories: records of :data:`records.FAULT_MEMORY`, shape (n,); what else they keep is written before it is read.
+    """
+    for i in range(memories.shape[0]):
+        memories[i].acting = False
+        memories[i].last[0] = memories[i].last[1] = 0.0
+
+
+@jit
+def _remember(memory: FaultMemory, u: np.ndarray, acting: bool, k: int) -> None:
+    """Keep what a later step of a degradation may need of the present command u, shape (2,)."""
+    for channel in range(2):
+        memory.past[k % MAX_DELAY, channel] = u[channel]
+        if acting and not memory.acting:
+            memory.kept[channel] = u[channel]
+        if not acting:
+            memory.last[channel] = u[channel]
+    memory.acting = acting
+
+
+@jit
+def degrade(
+    u_des: np.ndarray,
+    k: int,
+    dt: float,
+    faults: np.ndarray,
+    memories: np.ndarray,
+    limits: Limits,
+    u_f: np.ndarray,
+) -> None:
+    """Apply one degradation after the other to the automation's desired command, and clip to the physical limits.
+
+    A degradation of both channels whose size is in the unit of its channel has it as a steering angle, or as its rate;
+    the acceleration takes the same share of its limit. To be called once at every time step.
+
+    Args:
+        u_des: desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
+        k: time step.
+        dt: time step [s].
+        faults: records of :class:`DegradationParameters`, shape (n,).
+        memories: records of :data:`records.FAULT_MEMORY`, shape (n,).
+        limits: physical limits.
+        u_f: the degraded command is written here, shape (2,).
+    """
+    u_f[0], u_f[1] = u_des[0], u_des[1]
+    for i in range(faults.shape[0]):
+        fault, memory = faults[i], memories[i]
+        if fault.kind == 0:
+            continue
+        g = severity(fault, k * dt)
+        _remember(memory, u_f, g > 0.0, k)
+        if fault.advance != 0:
+            _advance(fault.advance, fault, memory, k, dt)
+        for channel in range(2):
+            if fault.act == 0 or not (fault.acceleration if channel == 0 else fault.steering):
+                continue
+            bound = limits.a_max if channel == 0 else limits.delta_max
+            size = fault.size
+            if channel == 0 and fault.steering and fault.in_unit_of_channel:
+                size *= limits.a_max / limits.delta_max
+            if memory.acting:
+                acting = Acting(fault, memory, channel, u_f[channel], g, size, bound, k, dt)
+                u_f[channel] = _act(fault.act, acting)
+                memory.last[channel] = u_f[channel]
+    u_f[0] = min(max(u_f[0], -limits.a_max), limits.a_max)
+    u_f[1] = min(max(u_f[1], -limits.delta_max), limits.delta_max)

@@ -1,0 +1,45 @@
+"""What the automation's perception has wrong, and the scene as the automation sees it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.faults.command import severity
+from shared_control_env.core.faults.kinds import PERCEIVE
+from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import Scene, Signals
+
+_perceive = PERCEIVE.call
+
+
+@jit
+def misperceive(t: float, faults: np.ndarray, signals: Signals) -> None:
+    """What the automation's perception has wrong, of all degradations together.
+
+    Args:
+        t: time [s].
+        faults: records of :class:`DegradationParameters`, shape (n,).
+        signals: record of :data:`records.SIGNALS`; ``misperception`` is written: the offset to the left [m], and 1
+            where the lead is missed, else 0.
+    """
+    signals.misperception[0], signals.misperception[1] = 0.0, 0.0
+    for i in range(faults.shape[0]):
+        if faults[i].perceive != 0:
+            _perceive(faults[i].perceive, faults[i], severity(faults[i], t), signals)
+
+
+@jit
+def see_as_automation(misperception: np.ndarray, p: Parameters, view: Scene) -> None:
+    """Turn a copy of the scene into what the automation takes it for.
+
+    Missing the vehicle that precedes, it drives at its own target speed.
+
+    Args:
+        misperception: of :func:`misperceive`, shape (2,).
+        p: parameters.
+        view: record of :data:`records.SCENE`, a copy of the scene; changed.
+    """
+    view.z[1] += misperception[0]
+    if misperception[1] > 0.0:
+        view.v_target = p.task.target_speed

@@ -1,0 +1,1 @@
+"""What a step gives back: observation, reward and info."""

@@ -1,0 +1,216 @@
+"""Every signal of a step as one record, which both kinds of environment report as ``info``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Annotated, Any
+
+import numpy as np
+
+from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.faults.command import has_set_in
+from shared_control_env.core.records import (
+    MAX_CHAIN,
+    MAX_TERMS,
+    Chain,
+    Memory,
+    Scene,
+    Signals,
+    Transition,
+    Vector2,
+    Vector6,
+    record_dtype,
+)
+
+
+class AutomationReport:
+    """How the automation came to its command.
+
+    Attributes:
+        status: control.automation.CONVERGED, ITERATION_LIMIT or FAILED.
+        iterations: done.
+        residual: projected gradient.
+        failures: steps so far at which the last command was held.
+    """
+
+    status: int
+    iterations: int
+    residual: float
+    failures: int
+
+
+class Info:
+    """Signals of the step just taken, from its start (k) on; from ``speed`` on, what it led to.
+
+    Attributes:
+        k: time step of the signals.
+        t: its time [s].
+        state: ego [x, y, psi, v_x, v_y, r], Cartesian frame [m, rad, m/s, rad/s].
+        z: ego [s, y, psi, v_x, v_y, r], road frame.
+        y_target: lateral position to track [m].
+        v_target: speed to track [m/s].
+        neighbours: follower, leader, preceding: present, s [m], d [m], speed [m/s], traffic row.
+        u_a_des: the automation's desired command [m/s^2, rad].
+        u_a_f: the same, degraded.
+        u_a_act: limited.
+        u_h_des: the driver's desired command.
+        u_h_act: the driver's actual command.
+        u: command that drove the vehicle.
+        r_x, r_y: longitudinal and lateral risk [-].
+        alpha_a: authority of the automation [-].
+        prediction: xi(k + tau_p) = [x, y, psi, v, a, r], Cartesian frame.
+        prediction_road: its (s, d) [m].
+        safe_area_lower, safe_area_upper: boundaries of C, vertices (s, d) [m].
+        safe_area_outcome: safe_area.REACHED or BLOCKED.
+        fault: what the degradations add to the command, u_a,f - u_a,des: ground truth.
+        misperception: the automation's lane offset [m], 1 where it misses its lead: ground truth.
+        fault_active: whether any degradation has set in: ground truth.
+        automation: how it came to its command.
+        speed: v_x after the step [m/s].
+        crashed, on_road: after the step.
+        in_lane: whether the ego's centre is in the lane to keep.
+        lane_departures: times that the centre has left the lane to keep.
+        rewards: unweighted terms, in the order that the settings name them.
+    """
+
+    k: int
+    t: float
+    state: Vector6
+    z: Vector6
+    y_target: float
+    v_target: float
+    neighbours: Annotated[np.ndarray, (3, 5)]
+    u_a_des: Vector2
+    u_a_f: Vector2
+    u_a_act: Vector2
+    u_h_des: Vector2
+    u_h_act: Vector2
+    u: Vector2
+    r_x: float
+    r_y: float
+    alpha_a: float
+    prediction: Vector6
+    prediction_road: Vector2
+    safe_area_lower: Chain
+    safe_area_upper: Chain
+    safe_area_outcome: int
+    fault: Vector2
+    misperception: Vector2
+    fault_active: bool
+    automation: AutomationReport
+    speed: float
+    crashed: bool
+    on_road: bool
+    in_lane: bool
+    lane_departures: int
+    rewards: Annotated[np.ndarray, (MAX_TERMS,)]
+
+
+INFO = record_dtype(Info)
+
+
+@jit
+def note_signals(scene: Scene, signals: Signals, faults: np.ndarray, failures: int, info: Info) -> None:
+    """Copy the signals of a scene's time step.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+        signals: record of :data:`records.SIGNALS`.
+        faults: records of :class:`DegradationParameters`, shape (n,).
+        failures: of the automation's solver so far.
+        info: record of :data:`INFO`, written up to ``automation``.
+    """
+    info.k, info.t = scene.k, scene.t
+    info.y_target, info.v_target = scene.y_target, scene.v_target
+    for i in range(6):
+        info.state[i], info.z[i], info.prediction[i] = scene.state[i], scene.z[i], signals.prediction[i]
+    for i in range(2):
+        info.u_a_des[i], info.u_a_f[i], info.u_a_act[i] = signals.u_a_des[i], signals.u_a_f[i], signals.u_a_act[i]
+        info.u_h_des[i], info.u_h_act[i], info.u[i] = signals.u_h_des[i], signals.u_h_act[i], signals.u[i]
+        info.fault[i] = signals.fault[i]
+        info.prediction_road[i], info.misperception[i] = signals.prediction_road[i], signals.misperception[i]
+    for i in range(3):
+        for j in range(5):
+            info.neighbours[i, j] = scene.neighbours[i, j]
+    info.r_x, info.r_y, info.alpha_a = signals.r_x, signals.r_y, signals.alpha_a
+    for k in range(MAX_CHAIN):
+        for i in range(2):
+            info.safe_area_lower[k, i] = scene.area.lower[k, i]
+            info.safe_area_upper[k, i] = scene.area.upper[k, i]
+    info.safe_area_outcome = scene.area.outcome
+    info.fault_active = False
+    for i in range(faults.shape[0]):
+        if has_set_in(faults[i], scene.t):
+            info.fault_active = True
+    info.automation.status, info.automation.iterations = signals.status, signals.iterations
+    info.automation.residual, info.automation.failures = signals.residual, failures
+
+
+@jit
+def note_outcome(speed: float, transition: Transition, memory: Memory, info: Info) -> None:
+    """Copy what a step led to.
+
+    Args:
+        speed: [m/s].
+        transition: record of :data:`records.TRANSITION` after the step.
+        memory: record of :data:`records.MEMORY`.
+        info: record of :data:`INFO`, written from ``speed`` on.
+    """
+    info.speed, info.crashed, info.on_road = speed, transition.crashed, transition.on_road
+    info.in_lane, info.lane_departures = memory.in_lane, memory.lane_departures
+    for i in range(MAX_TERMS):
+        info.rewards[i] = transition.terms[i]
+
+
+def as_dict(info: np.ndarray, terms: Sequence[str]) -> dict[str, Any]:
+    """Info as a nested dict: plain numbers, and views of the record's arrays.
+
+    Args:
+        info: of :data:`INFO`, a 0-d array.
+        terms: names of the reward's terms.
+    """
+    values = _named(info.item(), info.dtype)
+    values["rewards"] = dict(zip(terms, values["rewards"].tolist(), strict=False))
+    return values
+
+
+def as_batch(records: np.ndarray, mask: np.ndarray, terms: Sequence[str] = ()) -> dict[str, Any]:
+    """Records as Gymnasium's nested dict of arrays, each with the mask of the environments that have it.
+
+    Args:
+        records: of a structured type, shape (N,).
+        mask: which environments have them, shape (N,).
+        terms: names of the reward's terms, where the type is :data:`INFO`.
+    """
+    values: dict[str, Any] = {}
+    for name in records.dtype.names or ():
+        field = records[name]
+        if field.dtype.names:
+            values[name] = as_batch(field, mask)
+        elif name == "rewards":
+            values[name] = _masked({term: field[:, i].copy() for i, term in enumerate(terms)}, mask)
+        else:
+            values[name] = field
+    return _masked(values, mask)
+
+
+def _masked(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:
+    """Every entry followed by its mask."""
+    return {key: value for name, entry in values.items() for key, value in ((name, entry), (f"_{name}", mask))}
+
+
+def _named(values: tuple[Any, ...], dtype: np.dtype) -> dict[str, Any]:
+    """A record's values by their names."""
+    names, nested = _fields(dtype)
+    named = dict(zip(names, values, strict=True))
+    for name, inner in nested:
+        named[name] = _named(named[name], inner)
+    return named
+
+
+@cache
+def _fields(dtype: np.dtype) -> tuple[tuple[str, ...], tuple[tuple[str, np.dtype], ...]]:
+    """Names of a record's fields, and those that are records themselves."""
+    names = dtype.names or ()
+    return names, tuple((name, dtype[name]) for name in names if dtype[name].names)

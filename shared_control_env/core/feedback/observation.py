@@ -1,0 +1,156 @@
+"""What a driver can perceive, as a bounded vector: named, versioned specifications, one of which settings select.
+
+:func:`add_observation` adds one from outside the package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from shared_control_env.core.compile.calls import MATRIX, SINGLES, Interface
+from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT, Memory, Scene
+from shared_control_env.core.world.road import curvature_at
+from shared_control_env.nearest import hint
+
+PREVIEW = np.array([0.0, 10.0, 20.0, 40.0])
+"""Distances ahead at which the road's curvature is seen [m]."""
+
+WRITE = Interface(None, Scene, Memory, MATRIX, Parameters, SINGLES)
+"""``write(scene, memory, line, p, out)``: the features of an observation in their units, shape (n,)."""
+
+_write = WRITE.call
+
+
+class Observation(NamedTuple):
+    """A specification of an observation. What it gives never changes: a change is a new name.
+
+    Attributes:
+        name: with its version, in settings.
+        features: name and scale of every entry; the entry is the feature divided by its scale, clipped to [-1, 1].
+        write: writes the features in their units, compiled as :data:`WRITE`.
+    """
+
+    name: str
+    features: tuple[tuple[str, float], ...]
+    write: Callable[..., None]
+
+    @property
+    def size(self) -> int:
+        """Entries of the observation."""
+        return len(self.features)
+
+    @property
+    def scales(self) -> np.ndarray:
+        """Scale of every entry, in its unit, shape (n,)."""
+        return np.array([scale for _, scale in self.features])
+
+    def place_of(self, feature: str) -> int:
+        """Place of a feature.
+
+        Args:
+            feature: its name.
+
+        Raises:
+            ValueError: if there is none of this name.
+        """
+        names = [name for name, _ in self.features]
+        if feature not in names:
+            raise ValueError(f"observation {self.name!r} has no feature {feature!r}; {hint(feature, names)}")
+        return names.index(feature)
+
+
+_DRIVER_V0 = (
+    ("lateral error y - y_target [m]", 4.0),
+    ("heading relative to the road [rad]", pi / 4),
+    ("longitudinal speed v_x [m/s]", 40.0),
+    ("lateral speed v_y [m/s]", 5.0),
+    ("yaw rate r [rad/s]", 1.0),
+    ("speed error v_x - v_target [m/s]", 20.0),
+    ("curvature at the ego [1/m]", 0.05),
+    ("curvature 10 m ahead [1/m]", 0.05),
+    ("curvature 20 m ahead [1/m]", 0.05),
+    ("curvature 40 m ahead [1/m]", 0.05),
+    *(
+        (f"{name} {feature}", scale)
+        for name in ("follower", "leader", "preceding")
+        for feature, scale in (
+            ("present [-]", 1.0),
+            ("distance along the road [m]", 100.0),
+            ("distance across the road [m]", 8.0),
+            ("speed minus the ego's [m/s]", 20.0),
+        )
+    ),
+    ("own last acceleration command / a_max [-]", 1.0),
+    ("own last steering command / delta_max [-]", 1.0),
+    ("alpha_a as displayed [-]", 1.0),
+)
+
+
+def _write_driver_v0(scene: Scene, memory: Memory, line: np.ndarray, p: Parameters, out: np.ndarray) -> None:
+    """The driver's view; the fault, the automation's command and its risk are not in it."""
+    z = scene.z
+    out[0], out[1], out[2], out[3], out[4] = z[1] - scene.y_target, z[2], z[3], z[4], z[5]
+    out[5] = z[3] - scene.v_target
+    n = 6
+    for i in range(PREVIEW.shape[0]):
+        out[n] = curvature_at(line, z[0] + PREVIEW[i], 0.0)
+        n += 1
+    for i in range(3):
+        near = scene.neighbours[i]
+        if near[PRESENT] > 0.0:
+            out[n], out[n + 1], out[n + 2] = 1.0, near[NEAR_S] - z[0], near[NEAR_D] - z[1]
+            out[n + 3] = near[NEAR_SPEED] - z[3]
+        else:
+            out[n], out[n + 1], out[n + 2], out[n + 3] = 0.0, 0.0, 0.0, 0.0
+        n += 4
+    out[n] = memory.u_h_des[0] / p.limits.a_max
+    out[n + 1] = memory.u_h_des[1] / p.limits.delta_max
+    out[n + 2] = scene.displayed
+
+
+DRIVER_V0 = Observation("driver-v0", _DRIVER_V0, _write_driver_v0)
+"""What a driver can perceive; the default of every environment."""
+
+OBSERVATIONS: dict[str, Observation] = {DRIVER_V0.name: DRIVER_V0}
+"""All observations by name."""
+
+
+def add_observation(observation: Observation) -> None:
+    """Add an observation, which settings may select from then on.
+
+    Args:
+        observation: its name says its version.
+
+    Raises:
+        ValueError: if its name is taken, or numba cannot compile it.
+    """
+    if observation.name in OBSERVATIONS:
+        raise ValueError(f"observation {observation.name!r} is there already")
+    WRITE.address(observation.write)
+    OBSERVATIONS[observation.name] = observation
+
+
+@jit
+def observe(
+    address: int, scales: np.ndarray, scene: Scene, memory: Memory, line: np.ndarray, p: Parameters, out: np.ndarray
+) -> None:
+    """Write the observation of a scene: the features over their scales, clipped to [-1, 1].
+
+    Args:
+        address: of the observation's compiled function.
+        scales: of its features, shape (n,).
+        scene: record of :data:`records.SCENE`.
+        memory: record of :data:`records.MEMORY`: the driver's last command, and alpha_a.
+        line: reference line, shape (m, 6).
+        p: parameters.
+        out: written, float32, shape (n,).
+    """
+    _write(address, scene, memory, line, p, out)
+    for i in range(out.shape[0]):
+        out[i] = min(max(out[i] / scales[i], -1.0), 1.0)

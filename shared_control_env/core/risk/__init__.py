@@ -1,0 +1,1 @@
+"""Risk assessment of the degraded automation (Section III)."""

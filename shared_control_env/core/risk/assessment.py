@@ -1,0 +1,99 @@
+"""Risk assessment of the degraded automation (Section III): prediction, lateral and longitudinal risk."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+
+from shared_control_env.core.compile.jit import jit_inlined
+from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.records import (
+    ACCELERATION,
+    HEADING,
+    NEAR_ROW,
+    PRECEDING,
+    PRESENT,
+    SPEED,
+    YAW_RATE,
+    Scene,
+    Signals,
+    X,
+    Y,
+)
+from shared_control_env.core.risk.lateral import lateral_risk
+from shared_control_env.core.risk.longitudinal import longitudinal_risk
+from shared_control_env.core.risk.prediction import ctra
+from shared_control_env.core.world.road import locate
+from shared_control_env.core.world.vehicle import PSI, V_X, R, implicit_step
+
+
+@jit_inlined
+def predict_ego(scene: Scene, u_f: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals) -> None:
+    """Prediction xi(k + tau_p) of the ego under the degraded command (Eq. 1).
+
+    The yaw rate is that of the dynamic model after one step under u_a,f; pose and speed are the present
+    ones. "In the road frame" has two readings on a curve: the tangent frame at the ego, or the curvilinear
+    one. The tangent drifts off by x^2 / 2R (0.3 m in Case 2), which would itself count as risk; so
+    the prediction runs in the Cartesian frame and its end is located on the road.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+        u_f: degraded command, shape (2,).
+        line: reference line.
+        p: parameters.
+        signals: record of :data:`records.SIGNALS`; ``prediction`` and ``prediction_road`` are written.
+    """
+    state = scene.state
+    xi = signals.prediction
+    heading, wheel = (cos(state[PSI]), sin(state[PSI])), (cos(u_f[1]), sin(u_f[1]))
+    implicit_step(state, heading, u_f[0], u_f[1], wheel, 0.0, p.task.dt, p.model, xi)
+    xi[0], xi[1], xi[2], xi[3], xi[4], xi[5] = ctra(
+        state[0], state[1], state[2], state[V_X], u_f[0], xi[R], p.task.tau_p
+    )
+    s, d, _, _ = locate(line, xi[0], xi[1])
+    signals.prediction_road[0], signals.prediction_road[1] = s, d
+
+
+@jit_inlined
+def predict_neighbours(scene: Scene, traffic: np.ndarray, line: np.ndarray, tau: float, predicted: np.ndarray) -> None:
+    """Prediction of the three neighbours by Eq. 1 under their present acceleration and yaw rate.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+        traffic: other vehicles, shape (n, 8).
+        line: reference line.
+        tau: horizon [s].
+        predicted: rows ``[present, s, v]``, written, shape (3, 3).
+    """
+    for i in range(3):
+        predicted[i, 0] = scene.neighbours[i, PRESENT]
+        if scene.neighbours[i, PRESENT] > 0.0:
+            o = traffic[int(scene.neighbours[i, NEAR_ROW])]
+            x, y, _, v, _, _ = ctra(o[X], o[Y], o[HEADING], o[SPEED], o[ACCELERATION], o[YAW_RATE], tau)
+            predicted[i, 1] = locate(line, x, y)[0]
+            predicted[i, 2] = v
+
+
+@jit_inlined
+def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals) -> None:
+    """Both risks of letting ``signals.u_a_f`` drive the car (Eq. 1-8).
+
+    Args:
+        scene: record of :data:`records.SCENE`, its safe area found.
+        traffic: other vehicles, shape (n, 8).
+        line: reference line.
+        p: parameters.
+        signals: ``prediction``, ``prediction_road``, ``predicted_neighbours``, ``r_x`` and ``r_y`` are written.
+    """
+    predict_ego(scene, signals.u_a_f, line, p, signals)
+    predict_neighbours(scene, traffic, line, p.task.tau_p, signals.predicted_neighbours)
+    if p.authority.shared:  # the monitor looks through the automation's eyes
+        signals.prediction_road[1] += signals.misperception[0]
+        if signals.misperception[1] > 0.0:
+            signals.predicted_neighbours[PRECEDING, 0] = 0.0
+    s, d = signals.prediction_road[0], signals.prediction_road[1]
+    signals.r_y = lateral_risk(scene.area, s, d, p.lateral)
+    signals.r_x = longitudinal_risk(
+        s, signals.prediction[3], signals.predicted_neighbours, p.vehicle.length, scene.changing, p.longitudinal
+    )

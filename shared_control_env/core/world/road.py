@@ -1,0 +1,129 @@
+"""The road's reference line: straights and arcs, and the road frame ``(s, d)`` along it.
+
+A line is an array of segments, one row ``[s0, x0, y0, psi0, kappa, length]`` each: where it begins,
+as path length and pose, its curvature (positive to the left) and its length. Rows that begin at infinity
+fill an array up and are no segments. ``d`` is the offset to the left of the line. Lanes are the line shifted
+by their ``d``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan2, ceil, cos, hypot, pi, sin
+
+import numpy as np
+
+from shared_control_env.core.compile.jit import jit
+
+S0, X0, Y0, PSI0, KAPPA, LENGTH = range(6)
+"""Places in a segment's row."""
+
+MAX_ARC = pi / 2
+"""Longest arc of one segment [rad]: highway-env's CircularLane wraps after half a turn."""
+
+
+def reference_line(segments: Sequence[tuple[float, float]], lead_in: float = 0.0) -> np.ndarray:
+    """Chain ``(length, curvature)`` pairs into a line that passes the origin along x at s = 0.
+
+    Args:
+        segments: pairs of length [m] and curvature [1/m], from s = 0 on.
+        lead_in: length of a straight before s = 0 [m].
+
+    Returns:
+        Array of shape (n, 6); arcs longer than :data:`MAX_ARC` are split.
+    """
+    rows: list[list[float]] = []
+    s = x = -lead_in
+    y = psi = 0.0
+    for length, kappa in [(lead_in, 0.0), *segments] if lead_in else segments:
+        pieces = max(1, ceil(abs(kappa) * length / MAX_ARC))
+        for _ in range(pieces):
+            rows.append([s, x, y, psi, kappa, length / pieces])
+            x, y, psi = point_at(np.array(rows), s + length / pieces, 0.0)
+            s += length / pieces
+    return np.array(rows)
+
+
+@jit
+def segment_at(line: np.ndarray, s: float) -> int:
+    """Index of the segment that holds the path length s [m]; the end segments reach beyond the line."""
+    i = 0
+    while i + 1 < line.shape[0] and s >= line[i + 1, S0]:
+        i += 1
+    return i
+
+
+@jit
+def curvature_at(line: np.ndarray, s: float, d: float) -> float:
+    """Curvature [1/m] of the line shifted by d [m] to the left, at path length s [m]."""
+    kappa = line[segment_at(line, s), KAPPA]
+    return kappa / (1.0 - kappa * d)
+
+
+@jit
+def point_at(line: np.ndarray, s: float, d: float) -> tuple[float, float, float]:
+    """Cartesian position [m] and heading [rad] of the road at ``(s, d)``.
+
+    Args:
+        line: reference line, shape (n, 6).
+        s, d: path length and offset to the left [m].
+
+    Returns:
+        ``x, y, psi_road``.
+    """
+    row = line[segment_at(line, s)]
+    along, kappa, psi0 = s - row[S0], row[KAPPA], row[PSI0]
+    psi = psi0 + kappa * along
+    half = 0.5 * kappa * along
+    chord = along * (sin(half) / half if abs(half) > 1e-9 else 1.0)
+    x = row[X0] + chord * cos(psi0 + half) - d * sin(psi)
+    y = row[Y0] + chord * sin(psi0 + half) + d * cos(psi)
+    return x, y, psi
+
+
+@jit
+def _project(row: np.ndarray, x: float, y: float) -> tuple[float, float]:
+    """Path length from the segment's start and offset to the left of a point, beyond its ends too."""
+    c, sn = cos(row[PSI0]), sin(row[PSI0])
+    along = c * (x - row[X0]) + sn * (y - row[Y0])
+    across = -sn * (x - row[X0]) + c * (y - row[Y0])
+    kappa = row[KAPPA]
+    if kappa == 0.0:
+        return along, across
+    radius = 1.0 / kappa
+    side = 1.0 if radius > 0.0 else -1.0
+    angle = atan2(along * side, (radius - across) * side)
+    return angle * radius, radius - side * hypot(along, radius - across)
+
+
+@jit
+def locate(line: np.ndarray, x: float, y: float) -> tuple[float, float, float, float]:
+    """Road-frame coordinates of a point: the nearest of the segments' projections.
+
+    Args:
+        line: reference line, shape (n, 6).
+        x, y: Cartesian position [m].
+
+    Returns:
+        ``s, d`` [m], road heading [rad] and the line's curvature [1/m] there.
+    """
+    n = line.shape[0]
+    best = np.inf
+    s = d = 0.0
+    nearest = 0
+    for i in range(n):
+        if line[i, S0] == np.inf:
+            break
+        along, across = _project(line[i], x, y)
+        distance = abs(across) + max(0.0, -along, along - line[i, LENGTH])
+        if distance < best:
+            best, nearest = distance, i
+            s, d = line[i, S0] + along, across
+    row = line[nearest]
+    return s, d, row[PSI0] + row[KAPPA] * (s - row[S0]), row[KAPPA]
+
+
+@jit
+def wrap_angle(angle: float) -> float:
+    """The angle in [-pi, pi)."""
+    return (angle + pi) % (2.0 * pi) - pi

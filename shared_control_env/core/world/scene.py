@@ -1,0 +1,201 @@
+"""From poses and speeds to the scene: road frame, neighbours, driving region, targets and preview."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+
+from shared_control_env.core.compile.jit import jit, jit_inlined
+from shared_control_env.core.parameters import Parameters, TaskParameters
+from shared_control_env.core.records import (
+    BODY_LENGTH,
+    BODY_WIDTH,
+    FOLLOWER,
+    HEADING,
+    LEADER,
+    NEAR_D,
+    NEAR_ROW,
+    NEAR_S,
+    NEAR_SPEED,
+    PRECEDING,
+    PRESENT,
+    SPEED,
+    Scene,
+    X,
+    Y,
+)
+from shared_control_env.core.world.lane_change import change_progress
+from shared_control_env.core.world.road import curvature_at, locate, wrap_angle
+
+_SHORTEST_REGION = 0.5
+"""Length kept of a driving region when the preceding vehicle is all but touched [m]."""
+
+
+@jit_inlined
+def road_frame(line: np.ndarray, state: np.ndarray, z: np.ndarray) -> None:
+    """State in the road frame.
+
+    Args:
+        line: reference line, shape (n, 6).
+        state: Cartesian ``[x, y, psi, v_x, v_y, r]``, shape (6,).
+        z: ``[s, y, psi - psi_road, v_x, v_y, r]``, written, shape (6,).
+    """
+    s, d, psi_road, _ = locate(line, state[0], state[1])
+    z[0], z[1], z[2] = s, d, wrap_angle(state[2] - psi_road)
+    z[3], z[4], z[5] = state[3], state[4], state[5]
+
+
+@jit
+def _keep_nearest(neighbours: np.ndarray, which: int, row: int, s: float, d: float, v: float, s_e: float) -> None:
+    """Record a vehicle as a neighbour unless a nearer one is recorded."""
+    near = neighbours[which]
+    if near[PRESENT] == 0.0 or abs(s - s_e) < abs(near[NEAR_S] - s_e):
+        near[PRESENT], near[NEAR_S], near[NEAR_D], near[NEAR_SPEED], near[NEAR_ROW] = 1.0, s, d, v, row
+
+
+@jit_inlined
+def find_neighbours(
+    line: np.ndarray, traffic: np.ndarray, s_e: float, y_target: float, lane_width: float, neighbours: np.ndarray
+) -> None:
+    """Preceding vehicle in the lane to keep; leader and follower in the lanes beside it.
+
+    A vehicle counts to the lane its centre is in. Positions are those of the centres.
+
+    Args:
+        line: reference line.
+        traffic: rows of :mod:`records`' traffic columns, shape (n, 8).
+        s_e: the ego's path length [m].
+        y_target: centre of the lane to keep [m].
+        lane_width: [m].
+        neighbours: written, shape (3, 5).
+    """
+    for which in range(3):
+        neighbours[which, PRESENT] = 0.0
+    for row in range(traffic.shape[0]):
+        s, d, psi_road, _ = locate(line, traffic[row, X], traffic[row, Y])
+        v = traffic[row, SPEED] * cos(traffic[row, HEADING] - psi_road)
+        offset = abs(d - y_target)
+        if offset <= 0.5 * lane_width:
+            if s >= s_e:
+                _keep_nearest(neighbours, PRECEDING, row, s, d, v, s_e)
+        elif offset <= 1.5 * lane_width:
+            _keep_nearest(neighbours, LEADER if s >= s_e else FOLLOWER, row, s, d, v, s_e)
+
+
+@jit
+def following_speed(v_lead: float, gap: float, v: float, task: TaskParameters) -> float:
+    """Target speed behind a vehicle [m/s]: its own, or the one that brings the gap to a time headway.
+
+    ::
+
+        v_target = v_lead                                      as the paper has it ("drive consistently")
+        v_target = v_lead + (gap - d_0 - tau_h v) / tau_g      with a time headway tau_h
+
+    within 0 and the task's target speed; a constant time gap (Ioannou & Chien, Autonomous Intelligent Cruise Control,
+    IEEE Transactions on Vehicular Technology 42(4), 1993).
+
+    Args:
+        v_lead: speed of the vehicle ahead along the road [m/s].
+        gap: to it, bumper to bumper [m].
+        v: own speed [m/s].
+        task: headway, standstill gap d_0, closing time tau_g and target speed.
+    """
+    v_target = v_lead
+    if task.time_headway > 0.0:
+        v_target += (gap - task.standstill_gap - task.time_headway * v) / task.closing_time
+    return min(task.target_speed, max(v_target, 0.0))
+
+
+@jit
+def gap_ahead(scene: Scene) -> float:
+    """Gap to the preceding vehicle, bumper to bumper [m]; infinite without one.
+
+    Args:
+        scene: record of :data:`records.SCENE`.
+    """
+    preceding = scene.neighbours[PRECEDING]
+    return preceding[NEAR_S] - scene.z[0] - scene.bodies if preceding[PRESENT] > 0.0 else np.inf
+
+
+@jit
+def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p: Parameters, scene: Scene) -> None:
+    """Fill the scene at one time step, but for its safe area.
+
+    The target speed is that of :func:`following_speed` behind a vehicle (Section VI: "follow the
+    preceding"). The driving region is the lane to keep, from the ego to d_o behind the preceding
+    vehicle's rear or to the look-ahead (Section III-B). During a lane change it is both lanes, to the look-ahead,
+    with the vehicles as holes; the lane to keep is the old one for its first half and the new one from then on.
+
+    Args:
+        k: time step.
+        state: ego ``[x, y, psi, v_x, v_y, r]``, shape (6,).
+        traffic: other vehicles, shape (n, 8).
+        line: reference line.
+        p: parameters.
+        scene: record of :data:`records.SCENE`, written.
+    """
+    task = p.task
+    scene.k = k
+    scene.t = k * task.dt
+    for i in range(6):
+        scene.state[i] = state[i]
+    road_frame(line, state, scene.z)
+    s_e = scene.z[0]
+    for i in range(max(p.automation.H_p, p.driver.H_p)):
+        scene.kappa[i] = curvature_at(line, s_e + i * task.dt * state[3], 0.0)
+    progress = change_progress(scene.t, task.change_onset, task.change_duration)
+    scene.changing = 0.0 < progress < 1.0
+    scene.y_target = task.y_target + (task.y_goal - task.y_target) * progress
+    lane = task.y_target if progress < 0.5 else task.y_goal
+    find_neighbours(line, traffic, s_e, lane, task.lane_width, scene.neighbours)
+    preceding = scene.neighbours[PRECEDING]
+    scene.v_target = task.target_speed
+    end = s_e + p.safe_area.look_ahead
+    if preceding[PRESENT] > 0.0:
+        scene.bodies = 0.5 * (p.vehicle.length + traffic[int(preceding[NEAR_ROW]), BODY_LENGTH])
+        scene.v_target = following_speed(preceding[NEAR_SPEED], gap_ahead(scene), state[3], task)
+        if not scene.changing:
+            rear = preceding[NEAR_S] - 0.5 * traffic[int(preceding[NEAR_ROW]), BODY_LENGTH]
+            end = min(end, rear - p.safe_area.d_o)
+    rightmost = min(task.y_target, task.y_goal) if scene.changing else lane
+    leftmost = max(task.y_target, task.y_goal) if scene.changing else lane
+    scene.region[0] = s_e
+    scene.region[1] = max(end, s_e + _SHORTEST_REGION)
+    scene.region[2] = rightmost - 0.5 * task.lane_width
+    scene.region[3] = leftmost + 0.5 * task.lane_width
+
+
+@jit
+def holes_in_region(traffic: np.ndarray, line: np.ndarray, region: np.ndarray, corners: np.ndarray) -> int:
+    """Corners, in the road frame, of the vehicles that reach into the driving region.
+
+    Args:
+        traffic: other vehicles, shape (n, 8).
+        line: reference line.
+        region: start, end, low, high [m], shape (4,).
+        corners: written, shape (m, 4, 2); more vehicles than m are left out.
+
+    Returns:
+        How many there are.
+    """
+    count = 0
+    for row in range(traffic.shape[0]):
+        if count == corners.shape[0]:
+            break
+        s, d, psi_road, _ = locate(line, traffic[row, X], traffic[row, Y])
+        psi = traffic[row, HEADING] - psi_road
+        half_length, half_width = 0.5 * traffic[row, BODY_LENGTH], 0.5 * traffic[row, BODY_WIDTH]
+        reach_s = abs(half_length * cos(psi)) + abs(half_width * sin(psi))
+        reach_d = abs(half_length * sin(psi)) + abs(half_width * cos(psi))
+        if s + reach_s <= region[0] or s - reach_s >= region[1]:
+            continue
+        if d + reach_d <= region[2] or d - reach_d >= region[3]:
+            continue
+        for i in range(4):
+            along = half_length if i < 2 else -half_length
+            across = half_width if i == 0 or i == 3 else -half_width
+            corners[count, i, 0] = s + along * cos(psi) - across * sin(psi)
+            corners[count, i, 1] = d + along * sin(psi) + across * cos(psi)
+        count += 1
+    return count

@@ -1,0 +1,341 @@
+"""Three-degree-of-freedom dynamic bicycle (Eq. 11), from standstill to motorway speed.
+
+State ``z = [s, y, psi, v_x, v_y, r]``: position along and to the left of a path of curvature kappa,
+heading relative to it, longitudinal and lateral velocity in the body frame, yaw rate. With
+``kappa = 0`` the path is a straight line and ``[s, y, psi]`` is Eq. 11's ``[x, y, psi]``: the plant
+runs in the Cartesian frame with kappa = 0, the predictive controllers in the road frame.
+Axes follow ISO 8855: x forward, y to the left, positive steering and yaw rate turn left.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import TypeAlias
+
+import numpy as np
+
+from shared_control_env.core.compile.jit import jit, jit_allocating, jit_inlined
+from shared_control_env.core.parameters import VehicleParameters
+from shared_control_env.core.world.tyre import FORCE
+
+S, Y, PSI, V_X, V_Y, R = range(6)
+"""Places in the state vector."""
+
+PLANT_SUBSTEPS = 2
+"""Extrapolated substeps of one 0.05 s plant step; the error against an exact solution is in the tests."""
+
+GRAVITY = 9.81
+"""[m/s^2]."""
+
+SLOWEST_SLIP = 0.5
+"""Speed under which the slip angles of tyres that are not linear are taken as at this speed [m/s]."""
+
+_force = FORCE.call
+
+Direction: TypeAlias = tuple[float, float]
+"""Cosine and sine of an angle."""
+
+Axles: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
+"""Stiffness K [N/rad] and offset F [N] of the front and of the rear axle, whose lateral force is ``F - K slip``."""
+
+
+@jit_allocating
+def derivative(z: np.ndarray, a: float, delta: float, kappa: float, vehicle: VehicleParameters) -> np.ndarray:
+    """Right-hand side of Eq. 11 in the road frame.
+
+    ::
+
+        alpha_f = (v_y + l_f r) / v_x - delta        F_cf = -C_f alpha_f
+        alpha_r = (v_y - l_r r) / v_x                F_cr = -C_r alpha_r
+        v_x' = r v_y + a
+        v_y' = -r v_x + 2 (F_cf cos(delta) + F_cr) / m
+        r'   = 2 (l_f F_cf - l_r F_cr) / I_z
+        s'   = (v_x cos(psi) - v_y sin(psi)) / (1 - kappa y)
+        y'   = v_x sin(psi) + v_y cos(psi)
+        psi' = r - kappa s'
+
+    Args:
+        z: state, shape (6,); v_x must not be 0.
+        a: acceleration command [m/s^2].
+        delta: front steering angle [rad].
+        kappa: curvature of the path [1/m]; 0 for the Cartesian frame.
+        vehicle: parameters.
+
+    Returns:
+        Time derivative of the state, shape (6,).
+    """
+    y, psi, v_x, v_y, r = z[Y], z[PSI], z[V_X], z[V_Y], z[R]
+    F_cf = -vehicle.C_f * ((v_y + vehicle.l_f * r) / v_x - delta)
+    F_cr = -vehicle.C_r * ((v_y - vehicle.l_r * r) / v_x)
+    dz = np.empty(6)
+    dz[V_X] = r * v_y + a
+    dz[V_Y] = -r * v_x + 2.0 * (F_cf * cos(delta) + F_cr) / vehicle.m
+    dz[R] = 2.0 * (vehicle.l_f * F_cf - vehicle.l_r * F_cr) / vehicle.I_z
+    dz[S] = (v_x * cos(psi) - v_y * sin(psi)) / (1.0 - kappa * y)
+    dz[Y] = v_x * sin(psi) + v_y * cos(psi)
+    dz[PSI] = r - kappa * dz[S]
+    return dz
+
+
+@jit
+def implicit_step(
+    z: np.ndarray,
+    heading: Direction,
+    a: float,
+    delta: float,
+    wheel: Direction,
+    kappa: float,
+    h: float,
+    vehicle: VehicleParameters,
+    z_next: np.ndarray,
+) -> Direction:
+    """One step of length h, implicit in the lateral motion: the discrete model f^d of Eq. 12.
+
+    One explicit 0.05 s step is unstable below about 15 m/s (yaw damping grows as 1/v_x), and the slip
+    angles are singular at standstill. As in Ge et al. (arXiv 2011.09612) the lateral equations are
+    taken at the end of the step and multiplied by v_x, which removes both; unlike there, v_y and r
+    are solved together, since the coupled backward Euler step is stable wherever Eq. 11 is.
+    The speed stops at zero: braking never reverses the car.
+
+    ::
+
+        v     = max(0, v_x + h (a + r v_y))
+        v v_y+ = v v_y + h (-r+ v^2 - (K_f c (v_y+ + l_f r+) + K_r (v_y+ - l_r r+)) / m + K_f c delta v / m)
+        v r+   = v r   + h (-(l_f K_f (v_y+ + l_f r+) - l_r K_r (v_y+ - l_r r+)) / I_z + l_f K_f delta v / I_z)
+        s'    = (v cos(psi) - v_y+ sin(psi)) / (1 - kappa y)
+        psi+  = psi + h (r+ - kappa s')        s+ = s + h s'
+        y+    = y + h (v sin(psi+) + v_y+ cos(psi+))
+
+    with ``K = 2 C`` an axle and ``c = cos(delta)``; tyres that are not linear add the offset of :func:`axles_at`. First
+    order in h. Sines and cosines are handed on from step to
+    step, since they cost as much as all the rest.
+
+    Args:
+        z: state, shape (6,).
+        heading: cosine and sine of psi.
+        a: acceleration [m/s^2].
+        delta: front steering angle [rad].
+        wheel: cosine and sine of delta.
+        kappa: curvature of the path [1/m].
+        h: step [s].
+        vehicle: parameters.
+        z_next: the new state is written here, shape (6,); may be ``z`` itself.
+
+    Returns:
+        Cosine and sine of the new psi.
+    """
+    return _implicit_step(z, heading, a, delta, wheel, kappa, h, vehicle, linear_axles(vehicle), z_next)
+
+
+@jit_inlined
+def _implicit_step(
+    z: np.ndarray,
+    heading: Direction,
+    a: float,
+    delta: float,
+    wheel: Direction,
+    kappa: float,
+    h: float,
+    vehicle: VehicleParameters,
+    axles: Axles,
+    z_next: np.ndarray,
+) -> Direction:
+    """:func:`implicit_step` with the tyres linearised as the axles say."""
+    (v, v_y, r), _ = _step_velocities(z, a, delta, wheel, h, vehicle, axles)
+    heading, _ = _step_pose(z, heading, v, v_y, r, kappa, h, z_next)
+    z_next[V_X], z_next[V_Y], z_next[R] = v, v_y, r
+    return heading
+
+
+@jit_inlined
+def linear_axles(vehicle: VehicleParameters) -> Axles:
+    """Axles with the linear tyres of Eq. 11: ``K = 2 C``, and no offset.
+
+    Args:
+        vehicle: parameters.
+    """
+    return (2.0 * vehicle.C_f, 0.0), (2.0 * vehicle.C_r, 0.0)
+
+
+@jit
+def axles_at(z: np.ndarray, delta: float, vehicle: VehicleParameters) -> Axles:
+    """Stiffness K and offset F of the front and of the rear axle, whose lateral force is ``F - K slip``.
+
+    Tyres that are not linear are linearised about the slip angle of the state; the load of a tyre is the static one.
+
+    Args:
+        z: state, shape (6,).
+        delta: front steering angle [rad].
+        vehicle: parameters.
+    """
+    if vehicle.tyre == 0:
+        return linear_axles(vehicle)
+    v = max(z[V_X], SLOWEST_SLIP)
+    slip_f, slip_r = (z[V_Y] + vehicle.l_f * z[R]) / v - delta, (z[V_Y] - vehicle.l_r * z[R]) / v
+    load = 0.5 * vehicle.m * GRAVITY / (vehicle.l_f + vehicle.l_r)
+    force_f, slope_f = _force(vehicle.tyre, slip_f, vehicle.C_f, vehicle.mu, load * vehicle.l_r)
+    force_r, slope_r = _force(vehicle.tyre, slip_r, vehicle.C_r, vehicle.mu, load * vehicle.l_f)
+    front = -2.0 * slope_f, 2.0 * (force_f - slope_f * slip_f)
+    return front, (-2.0 * slope_r, 2.0 * (force_r - slope_r * slip_r))
+
+
+@jit_inlined
+def _step_velocities(
+    z: np.ndarray, a: float, delta: float, wheel: Direction, h: float, vehicle: VehicleParameters, axles: Axles
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+    """New speed, lateral velocity and yaw rate of :func:`implicit_step`, which solve ``M [v_y+, r+] = b``; M^-1."""
+    v_y, r = z[V_Y], z[R]
+    v = max(0.0, z[V_X] + h * (a + r * v_y))
+    l_f, l_r = vehicle.l_f, vehicle.l_r
+    (K_f, F_f), (K_r, F_r) = axles
+    K_fc, h_m, h_I = K_f * wheel[0], h / vehicle.m, h / vehicle.I_z
+    m11 = v + h_m * (K_fc + K_r)
+    m12 = h * v * v + h_m * (K_fc * l_f - K_r * l_r)
+    m21 = h_I * (l_f * K_f - l_r * K_r)
+    m22 = v + h_I * (l_f * l_f * K_f + l_r * l_r * K_r)
+    b1 = v * v_y + h_m * K_fc * delta * v
+    b2 = v * r + h_I * l_f * K_f * delta * v
+    if F_f != 0.0 or F_r != 0.0:
+        b1 += h_m * (F_f * wheel[0] + F_r) * v
+        b2 += h_I * (l_f * F_f - l_r * F_r) * v
+    scale = 1.0 / (m11 * m22 - m12 * m21)
+    i11, i12, i21, i22 = m22 * scale, -m12 * scale, -m21 * scale, m11 * scale
+    return (v, i11 * b1 + i12 * b2, i21 * b1 + i22 * b2), (i11, i12, i21, i22)
+
+
+@jit_inlined
+def _step_pose(
+    z: np.ndarray, heading: Direction, v: float, v_y: float, r: float, kappa: float, h: float, z_next: np.ndarray
+) -> tuple[Direction, float]:
+    """New pose of :func:`implicit_step` under the new velocities; cosine and sine of the new psi, and s'."""
+    s, y, psi = z[S], z[Y], z[PSI]
+    s_rate = (v * heading[0] - v_y * heading[1]) / (1.0 - kappa * y)
+    psi += h * (r - kappa * s_rate)
+    heading = cos(psi), sin(psi)
+    z_next[S] = s + h * s_rate
+    z_next[Y] = y + h * (v * heading[1] + v_y * heading[0])
+    z_next[PSI] = psi
+    return heading, s_rate
+
+
+@jit_inlined
+def implicit_step_jacobian(
+    z: np.ndarray,
+    heading: Direction,
+    a: float,
+    delta: float,
+    wheel: Direction,
+    kappa: float,
+    h: float,
+    vehicle: VehicleParameters,
+    z_next: np.ndarray,
+    A: np.ndarray,
+    B: np.ndarray,
+) -> Direction:
+    """:func:`implicit_step` with its derivatives ``A = dz+/dz`` and ``B = dz+/d[a, delta]``.
+
+    The lateral pair solves ``M x = b``; its derivative solves ``M dx = db - dM x``. Where braking holds
+    the speed at zero its derivatives vanish. The tyres are linear, as those of the controllers' model are.
+
+    Args:
+        z, heading, a, delta, wheel, kappa, h, vehicle, z_next: as in :func:`implicit_step`.
+        A: written, shape (6, 6).
+        B: written, shape (6, 2).
+
+    Returns:
+        Cosine and sine of the new psi.
+    """
+    y, v_x, v_y, r = z[Y], z[V_X], z[V_Y], z[R]
+    (v, v_y1, r1), (i11, i12, i21, i22) = _step_velocities(z, a, delta, wheel, h, vehicle, linear_axles(vehicle))
+    heading1, s_rate = _step_pose(z, heading, v, v_y1, r1, kappa, h, z_next)
+    z_next[V_X], z_next[V_Y], z_next[R] = v, v_y1, r1
+    # At rest the derivative is that of starting off, or a controller would never start.
+    moving = 1.0 if v_x + h * (a + r * v_y) >= 0.0 else 0.0
+    K_f, c, sn, h_m, h_I = 2.0 * vehicle.C_f, wheel[0], wheel[1], h / vehicle.m, h / vehicle.I_z
+
+    # Derivatives of (v_y+, r+) with respect to the new speed v, then v_y, r and delta.
+    e1 = v_y + h_m * K_f * c * delta - v_y1 - 2.0 * h * v * r1
+    e2 = r + h_I * vehicle.l_f * K_f * delta - r1
+    V_v, R_v = i11 * e1 + i12 * e2, i21 * e1 + i22 * e2
+    V_vy, R_vy = i11 * v, i21 * v
+    V_r, R_r = i12 * v, i22 * v
+    e1 = h_m * K_f * (v * (c - delta * sn) + sn * (v_y1 + vehicle.l_f * r1))
+    e2 = h_I * vehicle.l_f * K_f * v
+    V_d, R_d = i11 * e1 + i12 * e2, i21 * e1 + i22 * e2
+
+    for i in range(6):
+        for j in range(6):
+            A[i, j] = 0.0
+        B[i, 0] = B[i, 1] = 0.0
+    v_vx, v_vy, v_r, v_a = moving, moving * h * r, moving * h * v_y, moving * h
+    A[V_X, V_X], A[V_X, V_Y], A[V_X, R], B[V_X, 0] = v_vx, v_vy, v_r, v_a
+    A[V_Y, V_X], A[V_Y, V_Y], A[V_Y, R] = V_v * v_vx, V_vy + V_v * v_vy, V_r + V_v * v_r
+    A[R, V_X], A[R, V_Y], A[R, R] = R_v * v_vx, R_vy + R_v * v_vy, R_r + R_v * v_r
+    B[V_Y, 0], B[V_Y, 1], B[R, 0], B[R, 1] = V_v * v_a, V_d, R_v * v_a, R_d
+
+    # s', psi+ and y+ by the chain rule through v, v_y+ and r+.
+    stretch = 1.0 / (1.0 - kappa * y)
+    cp, sp = heading
+    cp1, sp1 = heading1
+    s_rate_y = kappa * s_rate * stretch
+    s_rate_psi = -(v * sp + v_y1 * cp) * stretch
+    y_psi1 = v * cp1 - v_y1 * sp1
+    A[S, S], A[Y, Y], A[PSI, PSI] = 1.0, 1.0, 1.0
+    A[S, Y], A[S, PSI] = h * s_rate_y, h * s_rate_psi
+    A[PSI, Y], A[PSI, PSI] = -h * kappa * s_rate_y, 1.0 - h * kappa * s_rate_psi
+    A[Y, Y] += h * y_psi1 * A[PSI, Y]
+    A[Y, PSI] = h * y_psi1 * A[PSI, PSI]
+    for j in (V_X, V_Y, R):
+        ds = (A[V_X, j] * cp - A[V_Y, j] * sp) * stretch
+        A[S, j] = h * ds
+        A[PSI, j] = h * (A[R, j] - kappa * ds)
+        A[Y, j] = h * (A[V_X, j] * sp1 + A[V_Y, j] * cp1 + y_psi1 * A[PSI, j])
+    for j in range(2):
+        ds = (B[V_X, j] * cp - B[V_Y, j] * sp) * stretch
+        B[S, j] = h * ds
+        B[PSI, j] = h * (B[R, j] - kappa * ds)
+        B[Y, j] = h * (B[V_X, j] * sp1 + B[V_Y, j] * cp1 + y_psi1 * B[PSI, j])
+    return heading1
+
+
+@jit
+def extrapolated_step(
+    z: np.ndarray, a: float, delta: float, h: float, vehicle: VehicleParameters, work: np.ndarray
+) -> None:
+    """Advance ``z`` in place by h in the Cartesian frame, second order in h.
+
+    Richardson extrapolation of the implicit step, ``z(h) = 2 f(h/2, f(h/2, z)) - f(h, z)``, which keeps
+    its damping of the stiff lateral motion at any step (Hairer & Wanner, Solving ODEs II, Section IV.9).
+
+    Args:
+        z: state [x, y, psi, v_x, v_y, r], shape (6,), overwritten.
+        a, delta: command [m/s^2, rad].
+        h: step [s].
+        vehicle: parameters.
+        work: scratch, shape (2, 6).
+    """
+    coarse, fine = work[0], work[1]
+    heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
+    axles = axles_at(z, delta, vehicle)
+    _implicit_step(z, heading, a, delta, wheel, 0.0, h, vehicle, axles, coarse)
+    heading = _implicit_step(z, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles, fine)
+    axles = axles_at(fine, delta, vehicle)
+    _implicit_step(fine, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles, fine)
+    for i in range(6):
+        z[i] = 2.0 * fine[i] - coarse[i]
+    z[V_X] = max(0.0, z[V_X])
+
+
+@jit
+def plant_step(z: np.ndarray, a: float, delta: float, dt: float, vehicle: VehicleParameters, work: np.ndarray) -> None:
+    """Advance the plant by dt in place: :data:`PLANT_SUBSTEPS` extrapolated steps under a held command.
+
+    Args:
+        z: state [x, y, psi, v_x, v_y, r], shape (6,), overwritten.
+        a, delta: command [m/s^2, rad], held over the step.
+        dt: step [s].
+        vehicle: parameters.
+        work: scratch, shape (2, 6).
+    """
+    for _ in range(PLANT_SUBSTEPS):
+        extrapolated_step(z, a, delta, dt / PLANT_SUBSTEPS, vehicle, work)

@@ -1,0 +1,192 @@
+"""Vehicles on highway-env's road: the ego with the core's dynamics, and traffic that follows its lane."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from highway_env.road.lane import AbstractLane
+from highway_env.road.road import LaneIndex, Road
+from highway_env.vehicle.kinematics import Vehicle
+
+from shared_control_env.core import entries
+from shared_control_env.core.parameters import TrafficParameters
+from shared_control_env.core.records import (
+    ACCELERATION,
+    BODY_LENGTH,
+    BODY_WIDTH,
+    HEADING,
+    SPEED,
+    YAW_RATE,
+    X,
+    Y,
+    pack,
+)
+from shared_control_env.envs.settings import OWN_TRAFFIC
+
+
+class ArrayVehicle(Vehicle):
+    """A highway-env vehicle whose pose and speed live in one array that compiled functions advance.
+
+    highway-env assigns and reads ``position``, ``heading`` and ``speed``; they are views of the array. The
+    lane is looked up when somebody asks, not at every step.
+    """
+
+    _POSE: tuple[int, int, int, int]  # places of x, y, heading and speed in the array
+    _SIZE: int
+
+    def __init__(self, road: Road, position: Any, heading: float = 0.0, speed: float = 0.0) -> None:
+        self.array = np.zeros(self._SIZE)
+        super().__init__(road, position, heading, speed)
+
+    @property
+    def position(self) -> np.ndarray:
+        return self.array[self._POSE[0] : self._POSE[1] + 1]
+
+    @position.setter
+    def position(self, value: Any) -> None:
+        self.array[self._POSE[0] : self._POSE[1] + 1] = value
+
+    @property
+    def heading(self) -> float:
+        return float(self.array[self._POSE[2]])
+
+    @heading.setter
+    def heading(self, value: float) -> None:
+        self.array[self._POSE[2]] = value
+
+    @property
+    def speed(self) -> float:
+        return float(self.array[self._POSE[3]])
+
+    @speed.setter
+    def speed(self, value: float) -> None:
+        self.array[self._POSE[3]] = value
+
+    @property
+    def lane_index(self) -> LaneIndex:
+        return self.road.network.get_closest_lane_index(self.position, self.heading)
+
+    @lane_index.setter
+    def lane_index(self, value: LaneIndex) -> None:
+        """Nothing: the lane follows from the position."""
+
+    @property
+    def lane(self) -> AbstractLane:
+        return self.road.network.get_lane(self.lane_index)
+
+    @lane.setter
+    def lane(self, value: AbstractLane) -> None:
+        """Nothing: the lane follows from the position."""
+
+
+class EgoVehicle(ArrayVehicle):
+    """The ego: ``array`` is the state [x, y, psi, v_x, v_y, r] of the dynamic bicycle (Eq. 11).
+
+    Attributes:
+        target_speed: what highway-env's MOBIL expects of every vehicle [m/s].
+        parameters: record of :class:`Parameters`.
+    """
+
+    _POSE = (0, 1, 2, 3)
+    _SIZE = 6
+
+    def __init__(self, road: Road, state: np.ndarray, target_speed: float, parameters: np.ndarray) -> None:
+        self.parameters = parameters
+        self.LENGTH, self.WIDTH = (float(parameters["vehicle"][name]) for name in ("length", "width"))
+        super().__init__(road, state[:2], float(state[2]), float(state[3]))
+        self.array[:] = state
+        self.action = {"acceleration": 0.0, "steering": 0.0}
+        self.target_speed = target_speed
+        self._work = np.zeros((2, 6))
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity of the centre of mass in the Cartesian frame, slip included [m/s]."""
+        _, _, psi, v_x, v_y, _ = self.array
+        return np.array([v_x * np.cos(psi) - v_y * np.sin(psi), v_x * np.sin(psi) + v_y * np.cos(psi)])
+
+    def step(self, dt: float) -> None:
+        """Advance the dynamics by dt [s] under the stored action."""
+        action = self.action
+        entries.drive(self.array, action["acceleration"], action["steering"], dt, self.parameters, self._work)
+
+
+class LaneFollower(ArrayVehicle):
+    """Traffic that follows its lane and its plan (:mod:`core.world.traffic`); ``array`` is its row of the traffic.
+
+    Attributes:
+        plan: record of :class:`TrafficParameters`; by default constant speed, as in the paper's cases.
+    """
+
+    _POSE = (X, Y, HEADING, SPEED)
+    _SIZE = 8
+
+    def __init__(self, road: Road, position: Any, heading: float = 0.0, speed: float = 0.0) -> None:
+        super().__init__(road, position, heading, speed)
+        self.array[BODY_LENGTH], self.array[BODY_WIDTH] = self.LENGTH, self.WIDTH
+        self.plan = pack(TrafficParameters())
+        self.step(0.0)
+
+    def act(self, action: dict | str | None = None) -> None:
+        """Decide on the acceleration."""
+        road = self.road
+        entries.decide_acceleration(
+            self.array, self.plan, road.time, road.rows[0], road.rows[1:], road.line, road.lane_width
+        )
+
+    def step(self, dt: float) -> None:
+        """Advance along the lane by dt [s]."""
+        entries.move_along(self.array, self.plan, self.road.line, self.road.time, dt)
+
+
+def vehicle_class(path: str) -> type[Vehicle]:
+    """Class of the other vehicles by its path, such as ``highway_env.vehicle.behavior.IDMVehicle``.
+
+    A setting may come from a file of somebody else's, so that it imports nothing: a class is found in highway-env, in
+    this package, or in a module that the program has imported itself.
+
+    Raises:
+        ValueError: if there is no such class, or it is no vehicle of highway-env.
+    """
+    module, _, name = path.rpartition(".")
+    what = f"config['other_vehicles_type'] = {path!r}"
+    if module.split(".")[0] in ("highway_env", "shared_control_env"):
+        try:
+            found = getattr(import_module(module), name, None)
+        except ImportError as error:
+            raise ValueError(f"{what} is not the path of a class: {error}") from None
+    elif module in sys.modules:
+        found = getattr(sys.modules[module], name, None)
+    else:
+        raise ValueError(
+            f"{what} must be the path of a class, such as {OWN_TRAFFIC!r}; its module {module!r} is neither "
+            "highway-env's nor imported already"
+        )
+    unfit = found in (ArrayVehicle, EgoVehicle)
+    if not isinstance(found, type) or not issubclass(found, Vehicle) or unfit:
+        raise ValueError(f"{what} must be the path of a class of vehicles, such as {OWN_TRAFFIC!r}; it is {found!r}")
+    return found
+
+
+def write_row(vehicle: Vehicle, row: np.ndarray) -> None:
+    """Write any highway-env vehicle as a row of the traffic array, shape (8,).
+
+    Acceleration and yaw rate of a kinematic vehicle are those of its present action.
+    """
+    if isinstance(vehicle, LaneFollower):
+        row[:] = vehicle.array
+        return
+    if isinstance(vehicle, EgoVehicle):
+        row[X], row[Y], row[HEADING], row[SPEED], _, row[YAW_RATE] = vehicle.array.tolist()
+        row[ACCELERATION] = vehicle.action["acceleration"]
+        row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.LENGTH, vehicle.WIDTH
+        return
+    row[X], row[Y] = vehicle.position
+    row[HEADING], row[SPEED] = vehicle.heading, vehicle.speed
+    row[ACCELERATION] = vehicle.action["acceleration"]
+    slip = np.arctan(0.5 * np.tan(vehicle.action["steering"]))
+    row[YAW_RATE] = vehicle.speed * np.sin(slip) / (0.5 * vehicle.LENGTH)
+    row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.LENGTH, vehicle.WIDTH

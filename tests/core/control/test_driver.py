@@ -1,0 +1,101 @@
+"""The driver's program against the same cost, written down by itself: a rollout of the linear model under Eq. 16."""
+
+import numpy as np
+import pytest
+
+from shared_control_env.core import entries
+from shared_control_env.core.control import condensing
+from shared_control_env.core.control.driver import SHARE_OF_DESIRED, SLACK_LINEAR, SLACK_QUADRATIC
+from shared_control_env.core.parameters import InternalModelParameters, Parameters
+from shared_control_env.core.records import pack
+from shared_control_env.core.world.vehicle import implicit_step_jacobian
+from tests.scenes import random_state, scene_of, traffic
+
+BOUNDS = np.array([5.0, np.pi / 6])
+
+
+def build(parameters, scene, u_last, u_h_act):
+    w = parameters.driver
+    n, rows = 2 * w.H_c + 1, 2 * w.H_p + parameters.internal_model.active
+    P, q, A = np.zeros((n, n)), np.zeros(n), np.zeros((rows + n, n))
+    low, high = np.zeros(rows + n), np.zeros(rows + n)
+    work = np.zeros((), condensing.WORKSPACE)
+    entries.build_program(scene, u_last, u_h_act, pack(parameters), work, P, q, A, low, high)
+    return P, q, A, low, high
+
+
+def linear_model(parameters, scene, u):
+    """``z+ = A z + B u + affine`` at the scene's state and a command, at every stage."""
+    z, stages = scene["z"], []
+    heading, wheel = (np.cos(z[2]), np.sin(z[2])), (np.cos(u[1]), np.sin(u[1]))
+    for i in range(parameters.driver.H_p):
+        A, B, f = np.zeros((6, 6)), np.zeros((6, 2)), np.zeros(6)
+        implicit_step_jacobian(z, heading, u[0], u[1], wheel, scene["kappa"][i], 0.05, parameters.vehicle, f, A, B)
+        stages.append((A, B, f - A @ z - B @ u))
+    return stages
+
+
+def rollout(parameters, scene, U, u_last, u_h_act):
+    """Cost of the desired commands U, shape (H_c, 2), and the states, by the definition of the problem."""
+    w, internal = parameters.driver, parameters.internal_model
+    felt = scene["felt"]
+    phi = np.exp(-0.05 / internal.T_h)
+    stages = linear_model(parameters, scene, felt + u_h_act if internal.active else u_last)
+    z, arm, cost, states = scene["z"].copy(), u_h_act.copy(), 0.0, []
+    Q = np.array([w.Q_a, w.Q_delta])
+    for i, (A, B, affine) in enumerate(stages):
+        desired = U[min(i, w.H_c - 1)]
+        u = felt + arm if internal.active else desired
+        if internal.active and 1 <= i <= w.H_c:
+            cost += Q @ u**2
+        arm = phi * arm + internal.K_h * (1.0 - phi) * (desired - felt)
+        z, before = A @ z + B @ u + affine, z
+        states.append(z)
+        cost += w.W * (z[1] - scene["y_target"]) ** 2 + w.H * (z[3] - scene["v_target"]) ** 2
+        cost += w.N * ((z[5] - before[5]) / 0.05) ** 2
+    cost += (SHARE_OF_DESIRED if internal.active else 1.0) * np.sum(Q * U**2)
+    return cost, np.array(states)
+
+
+@pytest.mark.parametrize("active", [False, True])
+@pytest.mark.parametrize("horizons", [(10, 3), (6, 6), (1, 1), (30, 10)])
+@pytest.mark.parametrize("seed", range(8))
+def test_cost_and_rows_are_those_of_the_rollout(active, horizons, seed):
+    rng = np.random.default_rng(seed)
+    H_p, H_c = horizons
+    model = InternalModelParameters(active, float(rng.uniform(0.5, 1.5)), float(rng.uniform(0.05, 0.5)))
+    parameters = Parameters(internal_model=model)
+    parameters = parameters._replace(driver=parameters.driver._replace(H_p=H_p, H_c=min(H_c, H_p)))
+    scene = scene_of(random_state(rng) + [0, 0, 0, 5.0, 0, 0], pack(parameters), traffic((30.0, 0.0, 10.0)))
+    scene["felt"] = rng.uniform(-0.3, 0.3, 2) * BOUNDS
+    u_last, u_h_act = rng.uniform(-0.3, 0.3, (2, 2)) * BOUNDS
+    P, q, A, low, high = build(parameters, scene, u_last, u_h_act)
+    n = 2 * parameters.driver.H_c
+
+    def both(x):
+        cost, states = rollout(parameters, scene, x[:n].reshape(-1, 2) * BOUNDS, u_last, u_h_act)
+        return 0.5 * x @ P @ x + q @ x - SLACK_LINEAR * x[n] - SLACK_QUADRATIC * x[n] ** 2, cost, states
+
+    zero, constant, at_zero = both(np.zeros(n + 1))
+    assert zero == 0.0
+    for _ in range(5):
+        x = np.append(rng.uniform(-1.0, 1.0, n), 0.0)
+        value, cost, states = both(x)
+        assert value == pytest.approx(cost - constant, rel=1e-9, abs=1e-9)
+        rows = A @ x
+        np.testing.assert_allclose(rows[:H_p], states[:, 1] - at_zero[:, 1], atol=1e-10)
+        np.testing.assert_allclose(rows[H_p : 2 * H_p], rows[:H_p], atol=1e-12)
+        np.testing.assert_allclose(rows[-n - 1 : -1], x[:n])
+        if active:
+            assert rows[2 * H_p] == pytest.approx(states[-1, 0] - at_zero[-1, 0], abs=1e-9)
+            assert high[2 * H_p] == pytest.approx(float(scene["area"]["end"]) - at_zero[-1, 0], abs=1e-9)
+
+
+def test_without_the_internal_model_the_arm_and_what_is_felt_do_not_matter():
+    rng = np.random.default_rng(3)
+    scene = scene_of(random_state(rng))
+    first = build(Parameters(), scene, np.array([0.5, 0.02]), np.zeros(2))
+    scene["felt"] = [1.0, 0.1]
+    again = build(Parameters(), scene, np.array([0.5, 0.02]), np.array([2.0, 0.2]))
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a, b)

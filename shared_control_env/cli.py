@@ -1,4 +1,4 @@
-"""The command ``shared-control``: the benchmark, the replay of an episode, and what there is by name."""
+"""The command ``shared-control``: run the benchmark, replay an episode, and list the available names."""
 
 from __future__ import annotations
 
@@ -60,22 +60,22 @@ def _main(
 
 
 def _names(text: str) -> list[str] | str:
-    """Names of an option: separated by commas, or ``all``."""
+    """Names in an option's text, separated by commas, or ``all``."""
     return text if text == "all" else [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _seeds(text: str) -> list[int]:
-    """Seeds of an option: numbers and ranges such as 0-9, separated by commas."""
+    """Seeds in an option's text: numbers, and ranges such as 0-9, separated by commas."""
     numbers: list[int] = []
     for part in text.split(","):
         low, dash, high = part.strip().partition("-")
         if not low.isdecimal() or (dash and not high.isdecimal()):
-            raise typer.BadParameter(f"seeds = {text!r} must be numbers and ranges from 0 on, such as 0-9 or 1,2,5")
+            raise typer.BadParameter(f"seeds = {text!r} must be non-negative numbers or ranges, such as 0-9 or 1,2,5")
         first, last = int(low), int(high or low)
         if first > last or last >= 2**63 or last - first >= MOST_SEEDS:
             raise typer.BadParameter(
-                f"seeds = {text!r}: {part.strip()!r} must go up, by at most {MOST_SEEDS}, the largest number of seeds, "
-                f"and to {2**63 - 1}, the largest seed"
+                f"seeds = {text!r}: {part.strip()!r} must be an ascending range of at most {MOST_SEEDS} seeds, none "
+                f"above {2**63 - 1}"
             )
         numbers += range(first, last + 1)
     return list(dict.fromkeys(numbers))
@@ -83,7 +83,7 @@ def _seeds(text: str) -> list[int]:
 
 @contextmanager
 def _in_words(console: Console) -> Iterator[None]:
-    """Tell warnings in a line each, and errors of what was asked for as such."""
+    """Print each warning on one line, and turn errors in the user's request into command-line errors."""
 
     def tell(message: Any, *_: Any, **__: Any) -> None:
         console.print(f"Note: {message}", markup=False, highlight=False)
@@ -132,7 +132,7 @@ def benchmark(
             )
         except OSError as error:
             bar.stop()
-            text = f"{error}: what could be written until then is in {out}; start again to go on."
+            text = f"{error}: what could be written until then is in {out}; start again to continue."
             console.print(text, style="red", markup=False)
             raise typer.Exit(1) from None
     console.print(summary(table, console.width), markup=False)
@@ -140,7 +140,12 @@ def benchmark(
 
 
 def summary(table: Any, width: int = 80) -> Table | str:
-    """Means of the main metrics by authority and driver: a table, or lines where the terminal is too narrow for it."""
+    """Means of the main metrics by authority and driver: a table, or lines of text if the terminal is too narrow.
+
+    Args:
+        table: results of the benchmark, one row per episode.
+        width: width of the terminal [characters].
+    """
     means = table.groupby(["authority", "driver"])[list(COLUMNS)].mean()
     if max(sum(map(len, pair)) for pair in means.index) + 55 > width:
         return "\n".join(
@@ -180,11 +185,13 @@ def replay(
         if source is None:
             first, second = choose_one("driver", driver, DRIVERS), choose_one("authority", authority, AUTHORITIES)
             config: Any = {}
+            automation = None
         else:
-            first, second, config = entries_of(source.expanduser(), driver, authority)
+            first, second, config, automation = entries_of(source.expanduser(), driver, authority)
         given = None if degradation == AS_GIVEN else degradation
         frames: list[Any] | None = None if video is None else []
-        measured = replay_episode(scenario, (driver, first), (authority, second), given, seed, frames, config)
+        pair = (driver, first), (authority, second)
+        measured = replay_episode(scenario, *pair, given, seed, frames, config, automation)
     title = f"{scenario}, {degradation}, {driver}, {authority}, seed {seed}"
     table = Table("metric", "value", "unit", title=escape(title))
     for name, value in measured.items():
@@ -197,7 +204,7 @@ def replay(
 
 
 def _checked_video(path: Path) -> Path:
-    """Where a video can be written and nothing is yet, found out before its episode is driven."""
+    """Check that a video can be written to a path and that no file exists there, before the episode is run."""
     place = path.expanduser()
     if place.suffix.lower() != ".mp4":
         raise typer.BadParameter(f"video = {path} must be a name that ends with .mp4, such as drive.mp4")

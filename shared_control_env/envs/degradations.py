@@ -84,6 +84,9 @@ DEGRADATIONS: dict[str, Degradation | None] = {
 }
 """The library by name. The sizes run from what a driver hardly notices to what leaves the lane within a second."""
 
+STANDARD = tuple(DEGRADATIONS)
+"""Names of the package's own; those that others add come after them."""
+
 
 def add_degradation(name: str, degradation: Degradation) -> None:
     """Add a degradation, which settings and suites may name from then on; no scenario draws it by itself.

@@ -268,6 +268,9 @@ SCENARIOS: dict[str, Scenario] = {
 }
 """All scenarios by the name that the benchmark and the entry points know them by."""
 
+STANDARD = tuple(SCENARIOS)
+"""Names of the package's own; those that others add come after them."""
+
 
 def add_scenario(name: str, scenario: Scenario) -> None:
     """Add a scenario under its own name: for suites of the benchmark, and with Gymnasium under its id.

@@ -8,7 +8,7 @@ from shared_control_env.evaluation.catalogue import (
     DriverEntry,
     Suite,
 )
-from shared_control_env.evaluation.metrics import METRICS, Metric, Trajectory
+from shared_control_env.evaluation.metrics import METRICS, Metric, Trajectory, metric
 from shared_control_env.evaluation.replay import replay_episode
 from shared_control_env.evaluation.runner import evaluate
 
@@ -23,5 +23,6 @@ __all__ = [
     "Suite",
     "Trajectory",
     "evaluate",
+    "metric",
     "replay_episode",
 ]

@@ -15,6 +15,7 @@ from shared_control_env.controllers.allocators import (
     SoftmaxAuthority,
     TimeBasedAuthority,
 )
+from shared_control_env.controllers.automation import Planner
 from shared_control_env.controllers.driver import Driver
 from shared_control_env.controllers.scripted import (
     DistractedDriver,
@@ -25,7 +26,7 @@ from shared_control_env.controllers.scripted import (
 from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.core.parameters import IDENTIFIED_DRIVERS, PERSONS, PersonParameters, fitted_arms
 from shared_control_env.envs.degradations import DEGRADATIONS
-from shared_control_env.envs.scenarios import SCENARIOS
+from shared_control_env.envs.scenarios import DRAWN_V0, SCENARIOS
 from shared_control_env.envs.settings import as_plain
 from shared_control_env.nearest import hint, nearest
 
@@ -136,7 +137,14 @@ AUTHORITIES: dict[str, AuthorityEntry] = {
 
 SUITES: dict[str, Suite] = {
     "paper": Suite("the paper's two cases with their own faults", ("two_lane", "curve"), (None,)),
-    "full": Suite("eight drawn scenarios x every degradation and none", tuple(SCENARIOS)[2:], tuple(DEGRADATIONS)),
+    "full": Suite(
+        "eight drawn scenarios x every degradation and none",
+        (
+            *("lane_keeping", "bend", "s_curve", "lane_change", "cut_in"),
+            *("lead_braking", "dense_traffic", "curve_with_lead"),
+        ),
+        ("none", *DRAWN_V0),
+    ),
 }
 """Suites by name."""
 
@@ -255,6 +263,23 @@ def _check_maker(what: str, name: str, make: Any, kind: Any, methods: str) -> No
         inspect.signature(made.reset).bind(seed=0)
     except TypeError:
         raise ValueError(f"{what} {name!r}: its reset must take a seed, as in reset(self, seed=None)") from None
+
+
+def checked_automation(make: Any) -> None:
+    """Raise ValueError unless this makes an automation, or is None.
+
+    Args:
+        make: what a user gives, such as a class.
+    """
+    if make is None:
+        return
+    if isinstance(make, type) or callable(make):
+        made = make()
+        if not isinstance(made, type) and isinstance(made, Planner):
+            return
+    raise ValueError(
+        f"automation = {make!r} must be what makes one for each episode, such as a class with reset() and act(scene)"
+    )
 
 
 def chosen_suite(suite: str | Suite) -> Suite:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context, parent_process
 from threading import Thread
 from typing import Any
 
+from shared_control_env.evaluation.additions import additions, adopt
 from shared_control_env.evaluation.episodes import Batch, run
 
 Rows = list[dict[str, Any]]
@@ -40,11 +41,11 @@ def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows
     """
     for batch in batches:
         try:
-            pickle.dumps((batch.driver, batch.authority))
+            pickle.dumps((batch.driver, batch.authority, batch.automation, additions()))
         except Exception as error:
             raise WorkersLostError(
-                f"jobs = {jobs}: driver {batch.driver[0]!r} or authority {batch.authority[0]!r} cannot be sent to "
-                f"another process ({error}); define it in a file, under a name, or use jobs=1"
+                f"jobs = {jobs}: driver {batch.driver[0]!r}, authority {batch.authority[0]!r} or what was added "
+                f"cannot be sent to another process ({error}); define it in a file, under a name, or use jobs=1"
             ) from None
     first: dict[bool, Batch] = {}
     for batch in batches:
@@ -67,8 +68,26 @@ def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows
 
 
 def worker_pool(jobs: int) -> ProcessPoolExecutor:
-    """Processes that end with the one that starts them, however that ends."""
-    return ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_end_with_parent)
+    """Processes that end with the one that starts them, however that ends, and know what this one has added.
+
+    Args:
+        jobs: how many.
+    """
+    return ProcessPoolExecutor(
+        jobs, mp_context=get_context("spawn"), initializer=_begin_worker, initargs=(additions(),)
+    )
+
+
+def _begin_worker(added: Mapping[str, Mapping[str, Any]]) -> None:
+    """Take over what the parent has added, and end with it."""
+    adopt(added)
+    _end_with_parent()
+
+
+def _run_elsewhere(added: Mapping[str, Mapping[str, Any]], batch: Batch) -> Rows:
+    """:func:`episodes.run` in a process that may not know what was added."""
+    adopt(added)
+    return run(batch)
 
 
 def _end_with_parent() -> None:
@@ -101,8 +120,9 @@ def ray_cluster(batches: Sequence[Batch], jobs: int, address: str | None = None)
     started = not ray.is_initialized()
     if started:
         ray.init(address=address, num_cpus=None if address else jobs, include_dashboard=False, log_to_driver=False)
-    remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS)(run)
-    waiting = {remote.remote(batch): batch for batch in batches}
+    remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS)(_run_elsewhere)
+    added: Any = ray.put(additions())
+    waiting = {remote.remote(added, batch): batch for batch in batches}
     try:
         while waiting:
             done, _ = ray.wait(list(waiting))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
@@ -16,6 +16,7 @@ import numpy as np
 
 import shared_control_env
 from shared_control_env.controllers.allocators import Allocator, checked_authority
+from shared_control_env.controllers.automation import Planner
 from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.parameters import TRAFFIC_BODY
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
@@ -48,6 +49,7 @@ class Batch(NamedTuple):
         authority: name, and entry.
         episodes: degradation (None for the scenario's own) and seed of each.
         config: changes to the scenario's settings.
+        automation: makes another automation for each environment; None for the predictive controller.
     """
 
     scenario: str
@@ -55,6 +57,7 @@ class Batch(NamedTuple):
     authority: tuple[str, AuthorityEntry]
     episodes: tuple[tuple[str | None, int], ...]
     config: Mapping[str, Any]
+    automation: Callable[[], Planner] | None = None
 
     @property
     def key(self) -> str:
@@ -68,14 +71,25 @@ def plan(
     authorities: Mapping[str, AuthorityEntry],
     seeds: Sequence[int],
     config: Mapping[str, Any],
+    automation: Callable[[], Planner] | None = None,
 ) -> Iterator[Batch]:
-    """All episodes of a suite in batches, in a fixed order."""
+    """All episodes of a suite in batches, in a fixed order.
+
+    Args:
+        suite: scenarios and degradations.
+        drivers: by name.
+        authorities: by name.
+        seeds: of the episodes of each scenario and degradation.
+        config: changes to the settings of all scenarios.
+        automation: makes another automation; None for the predictive controller.
+    """
     episodes = [(degradation, seed) for degradation in suite.degradations for seed in seeds]
     for scenario in suite.scenarios:
         for driver in drivers.items():
             for authority in authorities.items():
                 for i in range(0, len(episodes), LARGEST_BATCH):
-                    yield Batch(scenario, driver, authority, tuple(episodes[i : i + LARGEST_BATCH]), config)
+                    part = tuple(episodes[i : i + LARGEST_BATCH])
+                    yield Batch(scenario, driver, authority, part, config, automation)
 
 
 def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
@@ -161,14 +175,27 @@ def versions() -> str:
     return ", ".join(["python " + python_version(), *parts, f"sources {source_digest()}"])
 
 
-def make_environment(batch: Batch, render_mode: str | None = None) -> SharedControlVectorEnv:
-    """Environment of a batch's episodes, what the kernel can decide bound."""
+def make_environment(batch: Batch, render_mode: str | None = None) -> Any:
+    """Environment of a batch's episodes, with the slots bound that need no Python.
+
+    Args:
+        batch: the episodes.
+        render_mode: ``rgb_array`` or None.
+    """
+    limiter, driver = batch.authority[1].make is None, batch.driver[1].make is None
+    if batch.automation is not None:
+        from shared_control_env.evaluation.one_by_one import SingleEnvironments  # which needs highway-env
+
+        automations = [batch.automation() for _ in batch.episodes]
+        return SingleEnvironments(
+            batch.scenario, automations, settings_of(batch, None), limiter, driver, render_mode=render_mode
+        )
     return SharedControlVectorEnv(
         SCENARIOS[batch.scenario],
         len(batch.episodes),
         config=settings_of(batch, None),
-        limiter=batch.authority[1].make is None,
-        driver=batch.driver[1].make is None,
+        limiter=limiter,
+        driver=driver,
         render_mode=render_mode,
         threads=1,
     )
@@ -241,11 +268,6 @@ class Recorder:
         )
 
 
-def _records(array: np.ndarray) -> list[np.ndarray]:
-    """Views of an array's records, each an array of no dimension."""
-    return [array[i : i + 1].reshape(()) for i in range(len(array))]
-
-
 class Policies:
     """Drivers and allocators of a batch that Python runs, one of each an environment.
 
@@ -254,8 +276,8 @@ class Policies:
         env: their environment, reset.
     """
 
-    def __init__(self, batch: Batch, env: SharedControlVectorEnv) -> None:
-        self._scenes, self._signals = _records(env.scenes), _records(env.signals)
+    def __init__(self, batch: Batch, env: Any) -> None:
+        self._scenes, self._signals = env.views()
         limits = env.config["limits"]
         self._limits = np.array([limits["a_max"], limits["delta_max"]])
         make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
@@ -308,7 +330,8 @@ def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, 
     for k in range(settings.steps):
         if frames is not None:
             frames.extend(env.render() or ())
-        observations, _, terminations, truncations, infos = env.step(policies.decide(observations))
+        action = policies.decide(observations)
+        observations, _, terminations, truncations, infos = env.step(action)
         if not recorder.note(k, infos, terminations | truncations):
             break
     env.close()

@@ -38,7 +38,19 @@ def fingerprint(make: Callable[..., Any]) -> str:
     Raises:
         ValueError: if it holds something whose content cannot be told.
     """
-    return sha256("\n".join(_parts(make, {})).encode()).hexdigest()[:16]
+    return digest_of(make)
+
+
+def digest_of(value: Any) -> str:
+    """Digest of a value: of the code of functions and classes, and of the content of all else.
+
+    Args:
+        value: what is to be told from others.
+
+    Raises:
+        ValueError: as :func:`fingerprint`.
+    """
+    return sha256("\n".join(_parts(value, {})).encode()).hexdigest()[:16]
 
 
 def _is_own(module: str) -> bool:

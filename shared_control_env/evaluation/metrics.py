@@ -8,6 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shared_control_env.nearest import hint
+
 LATERAL_ACCELERATION_LIMIT = 3.0
 """Largest lateral acceleration of a lane keeping system [m/s^2]; ISO 11270."""
 
@@ -92,22 +94,43 @@ class Metric(NamedTuple):
     measure: Callable[[Trajectory], float]
 
 
+BETTER = ("lower", "higher", "neither")
+"""Directions in which a metric is better."""
+
 METRICS: dict[str, Metric] = {}
 """All metrics by name, in the order of the tables."""
 
 
 def metric(unit: str, better: str) -> Callable[[Callable[[Trajectory], float]], Callable[[Trajectory], float]]:
-    """Enter a function into :data:`METRICS` under its name, its docstring as the definition."""
+    """Enter a function into :data:`METRICS` under its name, its docstring as the definition.
+
+    Args:
+        unit: of the value.
+        better: ``lower``, ``higher`` or ``neither``.
+
+    Raises:
+        ValueError: for another direction, a function without a docstring, or a name that is taken.
+    """
+    if better not in BETTER:
+        raise ValueError(f"better = {better!r}; {hint(better, BETTER)}")
 
     def enter(measure: Callable[[Trajectory], float]) -> Callable[[Trajectory], float]:
-        METRICS[measure.__name__] = Metric(unit, better, " ".join((measure.__doc__ or "").split()), measure)
+        if measure.__name__ in METRICS:
+            raise ValueError(f"metric {measure.__name__!r} is there already")
+        if not measure.__doc__:
+            raise ValueError(f"metric {measure.__name__!r} has no docstring, which is its definition")
+        METRICS[measure.__name__] = Metric(unit, better, " ".join(measure.__doc__.split()), measure)
         return measure
 
     return enter
 
 
 def measure_all(trajectory: Trajectory) -> dict[str, float]:
-    """Every metric of an episode."""
+    """Every metric of an episode.
+
+    Args:
+        trajectory: signals of the episode.
+    """
     return {name: float(entry.measure(trajectory)) for name, entry in METRICS.items()}
 
 
@@ -317,3 +340,7 @@ def solver_failures(t: Trajectory) -> float:
 def real_time_factor(t: Trajectory) -> float:
     """Simulated time over computing time, of the batch that the episode ran in; it differs from run to run."""
     return len(t.lateral_error) * t.dt / t.wall_time
+
+
+STANDARD = tuple(METRICS)
+"""Names of the package's own; those that others add come after them."""

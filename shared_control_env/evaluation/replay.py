@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from shared_control_env.controllers.automation import Planner
+from shared_control_env.evaluation.additions import additions, described
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
 from shared_control_env.evaluation.episodes import Batch, run, versions
 from shared_control_env.evaluation.fingerprint import fingerprint
@@ -29,6 +31,7 @@ def replay_episode(
     seed: int,
     frames: list[np.ndarray] | None = None,
     config: Mapping[str, Any] | None = None,
+    automation: Callable[[], Planner] | None = None,
 ) -> dict[str, float]:
     """Run one episode, as the benchmark runs it.
 
@@ -37,18 +40,38 @@ def replay_episode(
             scenario's own.
         frames: pictures of every step are appended, where a list is given.
         config: changes to the scenario's settings, those of the benchmark.
+        automation: makes another automation; None for the predictive controller.
 
     Returns:
         Its metrics.
     """
-    (row,) = run(Batch(scenario, driver, authority, ((degradation, seed),), config or {}), frames)
+    (row,) = run(Batch(scenario, driver, authority, ((degradation, seed),), config or {}, automation), frames)
     return {name: row[name] for name in METRICS}
 
 
-def entries_of(folder: Path, driver: str, authority: str) -> tuple[DriverEntry, AuthorityEntry, Mapping[str, Any]]:
-    """A driver, an authority and the config of the benchmark that a folder holds.
+class Entries(NamedTuple):
+    """What an episode of a benchmark was run with.
+
+    Attributes:
+        driver, authority: their entries.
+        config: changes to the scenario's settings.
+        automation: makes another automation; None for the predictive controller.
+    """
+
+    driver: DriverEntry
+    authority: AuthorityEntry
+    config: Mapping[str, Any]
+    automation: Callable[[], Planner] | None
+
+
+def entries_of(folder: Path, driver: str, authority: str) -> Entries:
+    """What an episode of the benchmark that a folder holds was run with.
 
     A user's own class is imported by its path, as from the present folder.
+
+    Args:
+        folder: of the benchmark.
+        driver, authority: their names there.
 
     Raises:
         ValueError: if the folder has no such names, or a class is not found any more or has changed.
@@ -68,7 +91,23 @@ def entries_of(folder: Path, driver: str, authority: str) -> tuple[DriverEntry, 
     else:
         make = _make("authority", authority, second)
         authority_entry = AuthorityEntry("given by the user", second["law"], make)
-    return driver_entry, authority_entry, manifest["config"]
+    automation = _make("automation", "given", manifest["automation"]) if manifest.get("automation") else None
+    _check_additions(folder, manifest.get("additions", {}))
+    return Entries(driver_entry, authority_entry, manifest["config"], automation)
+
+
+def _check_additions(folder: Path, expected: Mapping[str, Mapping[str, str]]) -> None:
+    """Raise ValueError unless this program has added what the one that ran the benchmark had."""
+    present = described(additions())
+    for table, entries in expected.items():
+        for name, digest in entries.items():
+            if name not in present.get(table, {}):
+                raise ValueError(
+                    f"{folder} was made with {name!r} added to the {table}, which this program has not added; replay "
+                    "its episodes in the program that does, by shared_control_env.evaluation.replay_episode"
+                )
+            if present[table][name] != digest:
+                raise ValueError(f"{name!r}, added to the {table}, has changed since {folder} was made")
 
 
 def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:

@@ -10,10 +10,12 @@ from typing import Any
 
 import pandas as pd
 
+from shared_control_env.controllers.automation import Planner
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.settings import as_plain
 from shared_control_env.evaluation import engines
+from shared_control_env.evaluation.additions import additions, described
 from shared_control_env.evaluation.catalogue import (
     AUTHORITIES,
     DRIVERS,
@@ -22,6 +24,7 @@ from shared_control_env.evaluation.catalogue import (
     DriverEntry,
     Drivers,
     Suite,
+    checked_automation,
     choose_one,
     chosen_authorities,
     chosen_drivers,
@@ -44,6 +47,7 @@ def evaluate(
     *,
     seeds: Iterable[int] = (0,),
     config: Mapping[str, Any] | None = None,
+    automation: Callable[[], Planner] | None = None,
     out: Path | str | None = None,
     fresh: bool = False,
     jobs: int = 1,
@@ -62,6 +66,8 @@ def evaluate(
         seeds: of the episodes; one seed gives every driver and authority the same episode.
         config: changes to the settings of all scenarios. What makes an entry what it is, such as the lag of ``mpc_1``,
             cannot be changed.
+        automation: makes another automation for each episode, such as its class, with ``reset()`` and ``act(scene)``;
+            its episodes run one by one, without the kernel.
         out: folder to keep the results in, as they come; a run that was stopped goes on from there. With it
             ``episodes.parquet`` and ``report.html`` are written at the end. Where a driver or an allocator of your own
             has changed its episodes are run again.
@@ -90,7 +96,8 @@ def evaluate(
     if config is not None and not isinstance(config, Mapping):
         raise ValueError(f"config = {config!r} must be a dict")
     changes = as_plain(config or {})
-    batches = list(plan(chosen, drivers, authorities, numbers, changes))
+    checked_automation(automation)
+    batches = list(plan(chosen, drivers, authorities, numbers, changes, automation))
     _check_settings(batches)
     if out is None:
         done = [row for _, rows in _progressing(_run(batches, jobs, engine), batches, 0, progress) for row in rows]
@@ -103,6 +110,10 @@ def evaluate(
         "drivers": {name: _described("driver", name, entry, DRIVERS) for name, entry in drivers.items()},
         "authorities": {name: _described("authority", name, entry, AUTHORITIES) for name, entry in authorities.items()},
     }
+    if automation is not None:
+        manifest["automation"] = _origin_and_fingerprint("automation", "given", automation)
+    if added := additions():
+        manifest["additions"] = described(added)
     folder = ResultsFolder(Path(out).expanduser(), manifest, fresh)
     try:
         for notice in folder.notices:
@@ -168,13 +179,20 @@ def _described(
         return {"origin": "catalogue", "fingerprint": None, **own}
     if entry.make is None:
         return {"origin": "settings", "fingerprint": entry.fingerprint, **own}
-    module, path = getattr(entry.make, "__module__", None), getattr(entry.make, "__qualname__", None)
+    return {**_origin_and_fingerprint(what, name, entry.make, entry.fingerprint), **own}
+
+
+def _origin_and_fingerprint(
+    what: str, name: str, make: Callable[..., Any], given: str | None = None
+) -> dict[str, str | None]:
+    """Where a user's class or function is found again, and what tells it from others."""
+    module, path = getattr(make, "__module__", None), getattr(make, "__qualname__", None)
     found = module not in (None, "__main__", "__mp_main__") and path is not None and "<" not in path
     try:
-        print_ = fingerprint(entry.make) if entry.fingerprint is None else f"{GIVEN}{entry.fingerprint}"
+        told = fingerprint(make) if given is None else f"{GIVEN}{given}"
     except ValueError as error:
         raise ValueError(f"{what} {name!r}: {error}") from None
-    return {"origin": f"{module}:{path}" if found else None, "fingerprint": print_, **own}
+    return {"origin": f"{module}:{path}" if found else None, "fingerprint": told}
 
 
 def _run(batches: Sequence[Batch], jobs: int, engine: str) -> Iterator[tuple[Batch, engines.Rows]]:

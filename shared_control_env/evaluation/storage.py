@@ -132,7 +132,8 @@ class ResultsFolder:
 
     def _joined(self, there: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, Any]:
         """The manifest with what this run adds to it."""
-        for part, value in wanted.items():
+        for part in {**there, **wanted}:
+            value = wanted.get(part)
             if part not in MAY_GROW and there.get(part) != value:
                 raise ValueError(
                     f"{self.path} holds results with {part} = {there.get(part)!r}, not {value!r}; they are not mixed: "

@@ -206,6 +206,11 @@ class SharedControlVectorEnv(VectorEnv):
         """Signals planned for the present step of each environment, records of :data:`records.SIGNALS`, shape (N,)."""
         return _read_only(self._batch.signals)
 
+    def views(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Scene and signals of each environment, read-only 0-d records, which stay those of the present step."""
+        each = [slice(i, i + 1) for i in range(self.num_envs)]
+        return [self.scenes[i].reshape(()) for i in each], [self.signals[i].reshape(()) for i in each]
+
     @property
     def episodes(self) -> tuple[Settings, ...]:
         """Settings of the present episode of each environment, with all that is random drawn."""

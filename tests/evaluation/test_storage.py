@@ -203,7 +203,7 @@ def test_numbers_of_numpy_in_entries():
 
 def test_a_given_fingerprint_is_trusted_when_an_episode_is_replayed(tmp_path):
     evaluate({"mine": DriverEntry("", Coast, fingerprint="v1")}, "none", ONE, out=tmp_path)
-    driver, _, _ = entries_of(tmp_path, "mine", "none")
+    driver, *_ = entries_of(tmp_path, "mine", "none")
     assert driver.make is Coast
 
 
@@ -325,7 +325,7 @@ def test_an_episode_is_replayed_as_it_was(tmp_path, monkeypatch):
     report = (tmp_path / "run/report.html").read_text()
     assert f"--from {tmp_path / 'run'}" in report
     assert "in the program that has the driver" in report
-    driver, authority, found = entries_of(tmp_path / "run", "coast", "none")
+    driver, authority, found, _ = entries_of(tmp_path / "run", "coast", "none")
     again = replay_episode(failed["scenario"], ("coast", driver), ("none", authority), None, 3, config=found)
     for name in ("lateral_rms", "driver_effort", "collisions", "min_ttc"):
         np.testing.assert_equal(again[name], failed[name])

@@ -1,0 +1,68 @@
+"""What a program has added to the package's tables: other processes need it too, and results depend on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from shared_control_env.core.faults import kinds
+from shared_control_env.core.feedback import observation, reward
+from shared_control_env.core.world import tyre
+from shared_control_env.envs import degradations, scenarios
+from shared_control_env.evaluation import metrics
+from shared_control_env.evaluation.fingerprint import digest_of
+
+TABLES: dict[str, dict[str, Any]] = {
+    "kinds": kinds.KINDS,
+    "tyres": tyre.TYRES,
+    "observations": observation.OBSERVATIONS,
+    "reward terms": reward.TERMS,
+    "degradations": degradations.DEGRADATIONS,
+    "scenarios": scenarios.SCENARIOS,
+    "metrics": metrics.METRICS,
+}
+"""The tables that programs add to, by what they hold."""
+
+OWN = {
+    "kinds": kinds.STANDARD,
+    "tyres": tyre.STANDARD,
+    "observations": observation.STANDARD,
+    "reward terms": reward.STANDARD,
+    "degradations": degradations.STANDARD,
+    "scenarios": scenarios.STANDARD,
+    "metrics": metrics.STANDARD,
+}
+"""Names of the package's own entries."""
+
+
+def additions() -> dict[str, dict[str, Any]]:
+    """Entries that are not the package's, by table and name; tables without any are left out."""
+    found = {
+        name: {key: entry for key, entry in table.items() if key not in OWN[name]} for name, table in TABLES.items()
+    }
+    return {name: entries for name, entries in found.items() if entries}
+
+
+def adopt(added: Mapping[str, Mapping[str, Any]]) -> None:
+    """Add what another process had added, unless the modules that were imported with it have done so.
+
+    Args:
+        added: of :func:`additions`.
+    """
+    for name, entries in added.items():
+        for key, entry in entries.items():
+            if key in TABLES[name]:
+                continue
+            if name == "scenarios":
+                scenarios.add_scenario(key, entry)
+            else:
+                TABLES[name][key] = entry
+
+
+def described(added: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """Digest of every added entry, which tells it from another of the same name.
+
+    Args:
+        added: of :func:`additions`.
+    """
+    return {name: {key: digest_of(entry) for key, entry in entries.items()} for name, entries in added.items()}

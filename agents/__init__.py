@@ -1,1 +1,1 @@
-"""Drivers that are trained; those that follow rules are in :mod:`shared_control_env.controllers.scripted`."""
+"""Drivers that are trained; drivers that follow rules are in :mod:`shared_control_env.controllers.scripted`."""

@@ -1,4 +1,4 @@
-"""One face for all drivers: predictive, scripted, recorded and trained, by name or by file."""
+"""A common interface to all drivers: predictive, scripted, recorded and trained, by name or by file."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
-from agents.policy import LearnedAllocator, LearnedDriver, Policy
-from agents.recorded import RecordedDriver
 from shared_control_env.controllers.allocators import Allocator
 from shared_control_env.controllers.driver import Driver
+from shared_control_env.controllers.recorded import RecordedDriver
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
+from shared_control_env.learned.policy import LearnedAllocator, LearnedDriver, Policy
 
 T = TypeVar("T")
 
 POLICIES = Path(__file__).parent / "policies"
-"""Trained policies that ship, with their model card."""
+"""Folder of the trained policies that ship with the package, with their model card."""
 
 
 def _policy(path: Path) -> Callable[[], Driver]:
@@ -25,8 +25,8 @@ def _policy(path: Path) -> Callable[[], Driver]:
 
 
 def _model(path: Path) -> Callable[[], Driver]:
-    """A model of Stable-Baselines3: pickled code, which runs as it is read."""
-    from agents.model_driver import ModelDriver  # which needs Stable-Baselines3
+    """Read a model of Stable-Baselines3: pickled code, which runs as it is read."""
+    from agents.model_driver import ModelDriver  # needs Stable-Baselines3
 
     return partial(ModelDriver, ModelDriver.read(path))
 
@@ -40,11 +40,11 @@ def _allocator(path: Path) -> Callable[[], Allocator]:
 
 
 READERS: dict[str, Callable[[Path], Callable[[], Driver]]] = {".npz": _policy, ".zip": _model, ".csv": _recording}
-"""How drivers are read, by the ending of the file."""
+"""Reader of a driver for each file extension."""
 
 
 def _read(what: str, path: Path, read: Callable[[Path], Callable[[], T]]) -> Callable[[], T]:
-    """What makes the driver or allocator of a file; one is made at once, so that what does not fit is refused here."""
+    """Return a function that makes the driver or allocator of a file; one trial call refuses unsuitable files here."""
     if not path.is_file():
         raise ValueError(f"{what} = {str(path)!r}: there is no such file")
     try:
@@ -56,12 +56,12 @@ def _read(what: str, path: Path, read: Callable[[Path], Callable[[], T]]) -> Cal
 
 
 def _digest(path: Path) -> str:
-    """What tells a file from others of the same name."""
+    """Digest that distinguishes a file from other files of the same name."""
     return sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def shipped(task: str) -> dict[str, Path]:
-    """Policies that ship, by name.
+    """Policies that ship with the package, by name.
 
     Args:
         task: key of :data:`agents.tasks.TASKS`.
@@ -73,19 +73,21 @@ def driver_entry(source: str, trusted: bool = False) -> DriverEntry:
     """A driver for :func:`shared_control_env.evaluation.evaluate`; its ``make`` is for ``DriverModel``.
 
     Args:
-        source: name of the benchmark's catalogue, such as ``mpc``; of a policy that ships, such as ``driver-0``; or a
-            file: a policy (``.npz``), a model of Stable-Baselines3 (``.zip``), or a recording (``.csv``).
-        trusted: whether a model may be read: it holds pickled code, which can do anything as it is read. The other
-            files hold numbers alone.
+        source: a name in the benchmark's catalogue, such as ``mpc``; the name of a policy that ships with the package,
+            such as ``driver-0``; or a file: a policy (``.npz``), a model of Stable-Baselines3 (``.zip``), or a
+            recording (``.csv``).
+        trusted: whether a model may be read. A model holds pickled code, which can do anything as it is read. The
+            other files hold only numbers.
 
     Raises:
-        ValueError: for an unknown name, with the nearest, a file that is none of these, or a model not trusted.
+        ValueError: for an unknown name (the message gives the nearest one), for a file that is none of these, or for a
+            model that is not trusted.
     """
     path = shipped("driver").get(source, Path(source).expanduser())
     if path.suffix == ".zip" and path.is_file() and not trusted:
         raise ValueError(
-            f"driver = {str(path)!r} holds pickled code, which runs as it is read; if you trust where it is from, pass "
-            "trusted=True (--trusted). Policies of agents.train (.npz) hold numbers alone."
+            f"driver = {str(path)!r} holds pickled code, which runs as it is read; if you trust its source, pass "
+            "trusted=True (--trusted). Policies of agents.train (.npz) hold only numbers."
         )
     if path.suffix in READERS:
         make = _read("driver", path, READERS[path.suffix])
@@ -98,11 +100,11 @@ def authority_entry(source: str) -> AuthorityEntry:
     """An authority for :func:`shared_control_env.evaluation.evaluate`; its ``make`` is for ``AuthorityLimiter``.
 
     Args:
-        source: name of the benchmark's catalogue, such as ``proportional``; of a policy that ships, such as
-            ``allocator-0``; or a file of a policy (``.npz``).
+        source: a name in the benchmark's catalogue, such as ``proportional``; the name of a policy that ships with the
+            package, such as ``allocator-0``; or a file of a policy (``.npz``).
 
     Raises:
-        ValueError: for an unknown name, with the nearest, or a file that is no policy.
+        ValueError: for an unknown name (the message gives the nearest one), or for a file that is not a policy.
     """
     path = shipped("allocator").get(source, Path(source).expanduser())
     if path.suffix == ".npz":

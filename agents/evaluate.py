@@ -1,6 +1,7 @@
-"""Compare trained drivers or allocators with the others, on seeds and faults that training left out.
+"""Compare trained drivers or allocators with the others, on seeds and faults left out of training.
 
-``python -m agents.evaluate`` takes those that ship; ``python -m agents.evaluate results/train/*/best.npz`` others.
+``python -m agents.evaluate`` compares the policies that ship with the package;
+``python -m agents.evaluate results/train/*/best.npz`` compares other policies.
 """
 
 from __future__ import annotations
@@ -13,18 +14,18 @@ import numpy as np
 import pandas as pd
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from scipy import stats
 
 from agents.drivers import authority_entry, driver_entry, shipped
-from agents.policy import Policy
 from agents.tasks import HELD_OUT_DEGRADATIONS, HELD_OUT_SEED, TASKS
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.evaluation import Suite, evaluate
 from shared_control_env.evaluation.catalogue import choose
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.statistics import COVERAGE, Interval, intervals
+from shared_control_env.learned.policy import Policy
 from shared_control_env.registration import ENVIRONMENTS
 
 METRICS = (
@@ -36,26 +37,26 @@ METRICS = (
     "lane_departures",
     "speed_rms",
 )
-"""Columns of the benchmark's table that are compared, less being better; terminated: by either of the next two."""
+"""Columns of the benchmark's table that are compared; less is better. ``terminated``: by either of the next two."""
 
 COMPARED = {
     "driver": ("mpc", "scripted", "none"),
     "allocator": ("proportional", "none", "fixed", "linear", "takeover", "time_based"),
 }
-"""Drivers of the catalogue that the trained ones are compared with, and authorities."""
+"""Drivers and authorities of the catalogue that the trained ones are compared with, by task."""
 
 BASELINE = {"driver": "mpc", "allocator": "proportional"}
-"""Which of them a trained one has to beat: the paper's driver, and the paper's fuzzy inference."""
+"""The baseline of each task: the paper's driver, and the paper's fuzzy inference."""
 
 LEARNED = "learned"
-"""Name of the trained ones taken together, each training seed one sample."""
+"""Name of all trained policies together; each training seed is one sample."""
 
 KINDS = ("left out of training", "seen in training")
-"""What a degradation was to the training."""
+"""Whether a degradation was left out of training or seen in training."""
 
 
 Values = dict[str, Interval]
-"""Every metric's mean with its interval."""
+"""Mean of every metric with its interval."""
 
 
 class Row(NamedTuple):
@@ -63,8 +64,8 @@ class Row(NamedTuple):
 
     Attributes:
         kind: one of :data:`KINDS`.
-        name: of a driver or an authority; :data:`LEARNED`; or ``learned - baseline``.
-        values: of :data:`METRICS`.
+        name: name of a driver or an authority; :data:`LEARNED`; or ``learned - baseline``.
+        values: means and intervals of :data:`METRICS`.
     """
 
     kind: str
@@ -80,18 +81,18 @@ def measure(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> pd.DataFrame:
-    """Episodes of all drivers under the fuzzy limiter, or of all authorities with the predictive driver.
+    """Run episodes of all drivers under the fuzzy limiter, or of all authorities with the predictive driver.
 
     Args:
         task: key of :data:`agents.tasks.TASKS`.
-        sources: the trained ones, as :func:`agents.drivers.driver_entry` takes them.
+        sources: the trained policies, as :func:`agents.drivers.driver_entry` takes them.
         scenarios: keys of :data:`envs.scenarios.SCENARIOS`.
-        seeds: how many of each degradation, from :data:`agents.tasks.HELD_OUT_SEED` on.
-        jobs: processes.
-        progress: called with the number of episodes done and of all.
+        seeds: number of seeds of each degradation, from :data:`agents.tasks.HELD_OUT_SEED` on.
+        jobs: number of processes.
+        progress: called with the number of finished episodes and the number of all episodes.
 
     Returns:
-        The benchmark's table; ``name`` is the driver or authority, ``kind`` says whether training knew the fault.
+        The benchmark's table; ``name`` is the driver or authority, and ``kind`` says whether training used the fault.
     """
     make: Callable[[str], Any] = driver_entry if task == "driver" else authority_entry
     learned = {f"{LEARNED} {i}": make(source) for i, source in enumerate(sources)}
@@ -108,20 +109,29 @@ def measure(
 def measure_and_show(
     console: Console, task: str, sources: Sequence[str], scenarios: Sequence[str], seeds: int, jobs: int
 ) -> pd.DataFrame:
-    """:func:`measure` with a progress bar."""
-    columns = (TextColumn(f"episodes, {task}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as bar:
-        running = bar.add_task("episodes", total=None)
+    """Run :func:`measure` with a progress bar.
+
+    Args:
+        console: where the progress is shown.
+        task, sources, scenarios, seeds, jobs: as in :func:`measure`.
+    """
+    with progress_bar(console) as bar:
+        running = bar.add_task(f"episodes, {task}", total=None)
         update = lambda done, total: bar.update(running, completed=done, total=total)
         return measure(task, sources, scenarios, seeds, jobs, update)
 
 
 def compare(table: pd.DataFrame, task: str) -> list[Row]:
-    """Every metric by kind of fault and name, and what the trained ones differ by from the baseline.
+    """Every metric by kind of fault and by name, and the difference between the trained policies and the baseline.
 
-    The intervals of the trained ones are Student's over training seeds, of one mean each over the same episodes; those
-    of the others are bootstrapped over episodes. Those of the differences hold both, the episodes in pairs; there are
-    none with a single training seed or a single episode of each scenario and degradation.
+    The interval of the trained policies is Student's over training seeds: each seed gives one mean, over the same
+    episodes. The intervals of the others are bootstrapped over episodes. The interval of a difference contains both
+    kinds, with the episodes in pairs. An interval does not exist with a single training seed or a single episode of
+    each scenario and degradation.
+
+    Args:
+        table: result of :func:`measure`.
+        task: key of :data:`agents.tasks.TASKS`.
     """
     rng, baseline = np.random.default_rng(0), BASELINE[task]
     rows = []
@@ -142,7 +152,7 @@ def compare(table: pd.DataFrame, task: str) -> list[Row]:
 def _difference(
     part: pd.DataFrame, means: pd.DataFrame, baseline: str, rng: np.random.Generator
 ) -> dict[str, Interval]:
-    """What the trained ones differ by from the baseline, with both intervals as one: seeds vary, and episodes do."""
+    """Difference between the trained policies and the baseline; the interval covers both seeds and episodes."""
     keys = ["scenario", "degradation", "seed"]
     reference = part[part["name"] == baseline].set_index(keys)[list(METRICS)]
     learned = part[part["name"].str.startswith(LEARNED)].groupby(keys)[list(METRICS)].mean()
@@ -158,7 +168,11 @@ def _difference(
 
 
 def over_seeds(values: np.ndarray) -> Interval:
-    """Mean of one value a training seed, with Student's interval; of a single seed there is none."""
+    """Mean of one value per training seed, with Student's interval; a single seed gives no interval.
+
+    Args:
+        values: one value per training seed, shape (n,).
+    """
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return Interval(mean, np.nan, np.nan, n)
@@ -167,10 +181,17 @@ def over_seeds(values: np.ndarray) -> Interval:
 
 
 def losses(table: pd.DataFrame, task: str) -> pd.DataFrame:
-    """Where the trained ones are worse than the baseline: scenario, degradation, metric, both means.
+    """Scenarios and degradations in which the trained policies are worse than the baseline.
 
-    That is where the whole interval over training seeds of the difference lies above zero. The many pairs are looked at
-    one by one: some losses are chance.
+    A loss is counted if the whole interval of the difference over training seeds lies above zero. The many pairs are
+    tested one by one, so some losses are due to chance.
+
+    Args:
+        table: result of :func:`measure`.
+        task: key of :data:`agents.tasks.TASKS`.
+
+    Returns:
+        One row per loss: scenario, degradation, metric, and both means.
     """
     keys, baseline = ["scenario", "degradation"], BASELINE[task]
     learned = table[table["name"].str.startswith(LEARNED)].groupby([*keys, "name"])[list(METRICS)].mean()
@@ -186,7 +207,12 @@ def losses(table: pd.DataFrame, task: str) -> pd.DataFrame:
 
 
 def where_it_loses(table: pd.DataFrame, task: str) -> list[str]:
-    """How many :func:`losses` there are of each metric, and the three largest."""
+    """The number of :func:`losses` in each metric, and the three largest, as lines of text.
+
+    Args:
+        table: result of :func:`measure`.
+        task: key of :data:`agents.tasks.TASKS`.
+    """
     lost, baseline = losses(table, task), BASELINE[task]
     lines = []
     for metric, part in lost.groupby("metric", sort=False):
@@ -200,12 +226,21 @@ def where_it_loses(table: pd.DataFrame, task: str) -> list[str]:
 
 
 def shown(value: Interval) -> str:
-    """A mean with its interval; one training seed has none."""
+    """A mean as text, with its interval if it has one.
+
+    Args:
+        value: the mean and its interval.
+    """
     return f"{value.estimate:.3g}" + (f" [{value.low:.3g}, {value.high:.3g}]" if np.isfinite(value.low) else "")
 
 
 def show(rows: Sequence[Row], console: Console) -> None:
-    """Print the means by kind of fault, and the trained ones' differences with their intervals."""
+    """Print the means by kind of fault, and the differences of the trained policies with their intervals.
+
+    Args:
+        rows: result of :func:`compare`.
+        console: where the tables are printed.
+    """
     for kind in KINDS:
         of_kind = [row for row in rows if row.kind == kind]
         table = Table(
@@ -221,7 +256,12 @@ def show(rows: Sequence[Row], console: Console) -> None:
 
 
 def scenarios_of(sources: Sequence[str], task: str) -> list[str]:
-    """Scenarios that the policies among the sources were trained in, all of them known to each."""
+    """Scenarios in which every policy among the sources was trained; lane keeping if there are none.
+
+    Args:
+        sources: names or files of policies.
+        task: key of :data:`agents.tasks.TASKS`.
+    """
     paths = [shipped(task).get(source, Path(source)) for source in sources]
     known = [Policy.load(path).card["environments"] for path in paths if path.suffix == ".npz"]
     common = [id for id in ENVIRONMENTS if known and all(id in ids for ids in known)]
@@ -241,7 +281,7 @@ def main(
         choose("task", task, TASKS)
         chosen = sources or list(shipped(task))
         if not chosen:
-            raise ValueError(f"no policy of the task {task!r} ships; name files")
+            raise ValueError(f"the package ships no policy of the task {task!r}; give files")
         names = [name.strip() for name in scenarios.split(",")] if scenarios else scenarios_of(chosen, task)
         choose("scenario", names, SCENARIOS)
         table = measure_and_show(console, task, chosen, names, seeds, jobs)

@@ -1,4 +1,4 @@
-"""From Stable-Baselines3's models to :class:`agents.policy.Policy`."""
+"""Conversion of Stable-Baselines3 models to :class:`shared_control_env.learned.policy.Policy`."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.policy import Policy, fold
+from shared_control_env.learned.policy import Policy, as_array64, fold
 
 
 def export(model: BaseAlgorithm, normalisation: VecNormalize | None, card: dict[str, Any]) -> Policy:
     """The deterministic policy of a model of PPO, SAC or TD3.
 
     Args:
-        model: trained, with a multilayer perceptron as its policy.
-        normalisation: of its observations, which are not clipped.
-        card: kept with it.
+        model: a trained model with a multilayer perceptron as its policy.
+        normalisation: normalisation of its observations, which must not be clipped; None if there is none.
+        card: card that is stored with the policy.
     """
     policy: Any = model.policy
     if isinstance(model, PPO):
@@ -29,13 +29,9 @@ def export(model: BaseAlgorithm, normalisation: VecNormalize | None, card: dict[
     else:
         parts = [part for part in policy.actor.mu if not isinstance(part, torch.nn.Tanh)]
     linear = [part for part in parts if isinstance(part, torch.nn.Linear)]
-    layers = [(_array(part.weight), _array(part.bias)) for part in linear]
+    layers = [(as_array64(part.weight), as_array64(part.bias)) for part in linear]
     if normalisation is not None:
         statistics: Any = normalisation.obs_rms
         layers = fold(layers, statistics.mean, np.sqrt(statistics.var + normalisation.epsilon))
     hidden = "tanh" if any(isinstance(part, torch.nn.Tanh) for part in parts) else "relu"
     return Policy(layers, hidden, not isinstance(model, PPO), card)
-
-
-def _array(tensor: torch.Tensor) -> np.ndarray:
-    return tensor.detach().cpu().numpy().astype(np.float64)

@@ -9,11 +9,11 @@ from typing import Any
 
 
 def hyperparameters(algorithm: str, ids: Sequence[str]) -> dict[str, Any]:
-    """Hyperparameters of an algorithm, with those of the environments where they have their own.
+    """Hyperparameters of an algorithm; those specific to a set of environments take precedence.
 
     Args:
-        algorithm: such as ``ppo``.
-        ids: of the environments.
+        algorithm: name of the algorithm, such as ``ppo``.
+        ids: ids of the environments.
     """
     tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())
     return {**tables[algorithm], **tables.get(f"{algorithm}:{','.join(ids)}", {})}

@@ -1,4 +1,4 @@
-"""Models of Stable-Baselines3 as drivers, as they are."""
+"""Models of Stable-Baselines3 as drivers, without conversion."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from shared_control_env.core.feedback.observation import DRIVER_V0
 from shared_control_env.core.parameters import Limits
 
 ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3}
-"""Algorithms by name."""
+"""Supported algorithms by name."""
 
 
 class ModelDriver:
     """A model that was trained on the environment's own observations, as the README shows.
 
     Args:
-        model: of Stable-Baselines3; it acts deterministically.
-        limits: of the commands.
+        model: model of Stable-Baselines3; it acts deterministically.
+        limits: limits of the commands; by default the environment's.
 
     Raises:
-        ValueError: if its spaces are others.
+        ValueError: if its observation or action space has another shape.
     """
 
     def __init__(self, model: BaseAlgorithm, limits: Limits | None = None) -> None:
@@ -32,16 +32,20 @@ class ModelDriver:
         if shapes != ((DRIVER_V0.size,), (2,)):
             raise ValueError(
                 f"the model maps observations of shape {shapes[0]} to actions of shape {shapes[1]}; a driver maps "
-                f"{(DRIVER_V0.size,)} to (2,); policies of agents.train are read from their best.npz"
+                f"{(DRIVER_V0.size,)} to (2,); a policy of agents.train is read from its best.npz"
             )
         self._model, self._limits = model, np.array(limits or Limits())
 
     @staticmethod
     def read(path: Path | str) -> BaseAlgorithm:
-        """The model in a file, of PPO, SAC or TD3. Pickled code in the file is run.
+        """Read a model of PPO, SAC or TD3 from a file. Pickled code in the file is run.
+
+        Args:
+            path: the file.
 
         Raises:
-            ValueError: if it is no model, its policy is of none of these, or it was trained on normalised observations.
+            ValueError: if the file is not a model, if its policy belongs to none of these algorithms, or if it was
+                trained on normalised observations.
         """
         data, _, _ = load_from_zip_file(path, device="cpu")
         if not data or "policy_class" not in data:
@@ -49,18 +53,27 @@ class ModelDriver:
         last = data.get("_last_obs")
         if last is not None and np.abs(np.asarray(last, dtype=float)).max() > 1.0:
             raise ValueError(
-                f"{path} was trained on observations beyond the environment's bounds, so behind VecNormalize or the "
-                "like, whose statistics it does not hold; train without, or with agents.train, which has its own"
+                f"{path} was trained on observations beyond the environment's bounds, so with VecNormalize or the "
+                "like, whose statistics the file does not hold; train without it, or use agents.train"
             )
         made_by = data["policy_class"]
         for algorithm in ALGORITHMS.values():
             if made_by in algorithm.policy_aliases.values():
                 return algorithm.load(path, device="cpu")
-        raise ValueError(f"{path} holds a {made_by.__name__}; known are the policies of {', '.join(ALGORITHMS)}")
+        raise ValueError(f"{path} holds a {made_by.__name__}; the known policies are those of {', '.join(ALGORITHMS)}")
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered and nothing drawn."""
+        """Do nothing; the driver has no state and draws no random numbers.
+
+        Args:
+            seed: not used.
+        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired acceleration and steering, shape (2,)."""
+        """Desired acceleration and steering [m/s^2, rad], shape (2,).
+
+        Args:
+            observation: the environment's observation, shape (n,).
+            scene: record of :data:`core.records.SCENE`; not used.
+        """
         return self._model.predict(observation, deterministic=True)[0] * self._limits

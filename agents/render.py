@@ -1,4 +1,4 @@
-"""Videos of one episode with several drivers beside one another: ``python -m agents.render``."""
+"""Videos of one episode with several drivers side by side: ``python -m agents.render``."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import numpy as np
 import pygame
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from agents.drivers import authority_entry, driver_entry
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.evaluation.catalogue import choose
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.replay import record, replay_episode
 
 TITLE_HEIGHT = 28
-"""Of the line over each picture [px]."""
+"""Height of the line of text above each picture [px]."""
 
 
 class Drive(NamedTuple):
     """One episode.
 
     Attributes:
-        title: who drives, under which authority, and how it went.
-        frames: a picture of every step.
+        title: the driver, the authority, and the outcome.
+        frames: one picture per step, uint8, shape (height, width, 3).
     """
 
     title: str
@@ -40,9 +40,9 @@ def drive(scenario: str, degradation: str, seed: int, driver: str, authority: st
     Args:
         scenario: key of :data:`envs.scenarios.SCENARIOS`.
         degradation: key of :data:`envs.degradations.DEGRADATIONS`.
-        seed: of the episode.
-        driver: as :func:`agents.drivers.driver_entry` takes it.
-        authority: as :func:`agents.drivers.authority_entry` takes it.
+        seed: seed of the episode.
+        driver: name or file, as :func:`agents.drivers.driver_entry` takes it.
+        authority: name or file, as :func:`agents.drivers.authority_entry` takes it.
         trusted: whether a model of Stable-Baselines3 may be read.
     """
     frames: list[np.ndarray] = []
@@ -55,9 +55,15 @@ def drive(scenario: str, degradation: str, seed: int, driver: str, authority: st
 
 
 def side_by_side(drives: Sequence[Drive]) -> list[np.ndarray]:
-    """Frames of all drives at the same time; one that ended shows its last.
+    """Join the pictures of all episodes at the same time; an episode that has ended shows its last picture.
 
-    Wide pictures go one under the other, others in a row; bytes of shape (height, width, 3), both even as MP4 needs.
+    Wide pictures are stacked vertically, others are placed in a row.
+
+    Args:
+        drives: the episodes, with pictures of equal size.
+
+    Returns:
+        Frames of bytes, shape (height, width, 3); height and width are even, as MP4 requires.
     """
     pygame.font.init()
     font = pygame.font.Font(None, 22)
@@ -106,10 +112,9 @@ def main(
         choose("scenario", scenario, SCENARIOS)
         choose("degradation", degradation, DEGRADATIONS)
         if path.exists():
-            raise ValueError(f"{path} exists already; remove it, or choose another --out")
+            raise ValueError(f"{path} already exists; remove it, or choose another --out")
         drives = []
-        columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn())
-        with Progress(*columns, console=console) as bar:
+        with progress_bar(console) as bar:
             running = bar.add_task("episodes", total=len(pairs))
             for driver, _, authority in pairs:
                 drives.append(drive(scenario, degradation, seed, driver, authority or "proportional", trusted))

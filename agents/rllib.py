@@ -1,7 +1,7 @@
 """Train the same tasks on Ray, on one machine or a cluster: ``python -m agents.rllib``; needs the extra ``rllib``.
 
 RLlib's env runners step environments in the compiled kernel, with the hyperparameters of :mod:`agents.train`. The
-policy that comes out is of the same kind, and :mod:`agents.evaluate` compares it.
+resulting policy is of the same kind, and :mod:`agents.evaluate` compares it.
 """
 
 from __future__ import annotations
@@ -23,45 +23,49 @@ from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
 from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 from ray.tune.registry import register_env
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from agents.card import card_of
-from agents.history import HISTORY, History
 from agents.hyperparameters import hyperparameters
-from agents.policy import Policy, fold
 from agents.tasks import TASKS, VALIDATION_SEED, training_config
-from agents.views import ACTION_OF, FEATURES_OF, view
 from shared_control_env.evaluation.catalogue import choose
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.learned.history import HISTORY, History
+from shared_control_env.learned.policy import Policy, as_array64, fold
+from shared_control_env.learned.views import ACTION_OF, FEATURES_OF, view
 from shared_control_env.registration import ENVIRONMENTS
 
 ENVIRONMENT = "shared_control_task"
-"""Name of the environments with Ray."""
+"""Name under which the environments are registered with Ray."""
 
 EXCLUDED = ["results", "docs", ".venv*", ".git"]
-"""What the workers do not need of the checkout."""
+"""Parts of the checkout that the workers do not need."""
 
 HYPERPARAMETERS = hyperparameters("ppo", [])
-"""The same as those of :mod:`agents.train`."""
+"""The same hyperparameters as those of :mod:`agents.train`."""
 
 LOG_STD = HYPERPARAMETERS["policy_kwargs"]["log_std_init"]
-"""Logarithm of the exploration's standard deviation to begin with."""
+"""Initial logarithm of the exploration's standard deviation."""
 
 
 class Normalisation(NamedTuple):
-    """Mean and standard deviation of what a policy sees, each of shape (HISTORY * size,)."""
+    """Normalisation of what a policy sees.
+
+    Attributes:
+        mean, std: mean and standard deviation, each of shape (HISTORY * size,).
+    """
 
     mean: np.ndarray
     std: np.ndarray
 
 
 class TaskVectorEnv(VectorWrapper):
-    """Environments of a task with the history of observations, as :func:`agents.vec_envs.make_environment` has them.
+    """Environments of a task with the history of observations, equivalent to :func:`agents.vec_envs.make_environment`.
 
     Args:
-        env: with Gymnasium's next-step autoreset, which RLlib expects.
+        env: environments with Gymnasium's next-step autoreset, which RLlib expects.
         task: key of :data:`agents.tasks.TASKS`.
-        normalisation: applied to what a policy sees.
+        normalisation: normalisation of what a policy sees.
     """
 
     def __init__(self, env: VectorEnv, task: str, normalisation: Normalisation) -> None:
@@ -75,13 +79,22 @@ class TaskVectorEnv(VectorWrapper):
         self._history, self._ended = History(env.num_envs, size), np.ones(env.num_envs, dtype=bool)
 
     def reset(self, *, seed: Any = None, options: Any = None) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin episodes."""
+        """Begin new episodes.
+
+        Args:
+            seed: seed or seeds of the environments, or None.
+            options: options of Gymnasium's ``reset``.
+        """
         observations, _ = self.env.reset(seed=seed, options=options)
         self._ended[:] = True
         return self._seen(observations), {}
 
     def step(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Step all environments; those that ended begin anew."""
+        """Step all environments; environments whose episode has ended begin a new one.
+
+        Args:
+            actions: actions of the policy in [-1, 1], shape (N, n).
+        """
         observations, rewards, terminations, truncations, _ = self.env.step(ACTION_OF[self._task](actions))
         seen = self._seen(observations)
         self._ended = terminations | truncations
@@ -96,10 +109,15 @@ class TaskVectorEnv(VectorWrapper):
 
 
 class TrainingSeeds(VectorWrapper):
-    """Spreads the seeds that RLlib gives, which follow one another from runner to runner, over those of training."""
+    """Maps the consecutive seeds that RLlib gives to its runners to seeds that are spread over the training range."""
 
     def reset(self, *, seed: Any = None, options: Any = None) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin episodes."""
+        """Begin new episodes.
+
+        Args:
+            seed: seed from RLlib, or None.
+            options: options of Gymnasium's ``reset``.
+        """
         if seed is not None:
             (word,) = np.random.SeedSequence(seed).generate_state(1)
             seed = int(word) % (VALIDATION_SEED - self.num_envs)
@@ -107,26 +125,39 @@ class TrainingSeeds(VectorWrapper):
 
 
 class QuietPPOModule(DefaultPPOTorchRLModule):
-    """PPO's network, whose exploration begins at :data:`LOG_STD`."""
+    """PPO's network with an initial exploration of :data:`LOG_STD`."""
 
     def setup(self) -> None:
-        """Make the layers."""
+        """Create the layers and set the initial exploration."""
         super().setup()
         with torch.no_grad():
             self.pi.log_std.fill_(LOG_STD)
 
 
 def make_environment(id: str, task: str, normalisation: Normalisation, num_envs: int) -> TaskVectorEnv:
-    """Environments of one env runner; arguments as in :class:`TaskVectorEnv`."""
+    """Environments of one env runner.
+
+    Args:
+        id: id of the environment.
+        task: key of :data:`agents.tasks.TASKS`.
+        normalisation: normalisation of what the policy sees.
+        num_envs: number of environments.
+    """
     bound: Any = {"limiter": task == "driver", "driver": task == "allocator"}
     env = gym.make_vec(id, num_envs=num_envs, config=training_config(id, task), threads=1, **bound)
     return TaskVectorEnv(env, task, normalisation)
 
 
 def measured_normalisation(id: str, task: str, num_envs: int = 64, steps: int = 200) -> Normalisation:
-    """Mean and standard deviation of what is seen while exploration alone acts; 1 for what is always the same.
+    """Mean and standard deviation of what is seen under pure exploration; the deviation is 1 for a constant entry.
 
-    Measured once: statistics that run along would have to be kept equal across a cluster.
+    The statistics are measured once. Running statistics would have to be kept equal across a cluster.
+
+    Args:
+        id: id of the environment.
+        task: key of :data:`agents.tasks.TASKS`.
+        num_envs: number of environments.
+        steps: number of steps of each environment.
     """
     size = HISTORY * len(FEATURES_OF[task])
     env = make_environment(id, task, Normalisation(np.zeros(size), np.ones(size)), num_envs)
@@ -149,16 +180,16 @@ def make_algorithm(
     environments: int = HYPERPARAMETERS["environments"],
     steps: int = HYPERPARAMETERS["n_steps"],
 ) -> Algorithm:
-    """PPO on the Ray that is connected.
+    """PPO on the Ray cluster that is connected.
 
     Args:
-        id: of the environment.
+        id: id of the environment.
         task: key of :data:`agents.tasks.TASKS`.
-        seed: of everything.
-        normalisation: of what the policy sees.
-        runners: env runners, each a process somewhere in the cluster.
-        environments: of each runner.
-        steps: of each environment between two updates.
+        seed: seed of all random numbers.
+        normalisation: normalisation of what the policy sees.
+        runners: number of env runners, each a process somewhere in the cluster.
+        environments: number of environments of each runner.
+        steps: number of steps of each environment between two updates.
     """
     given, batch = HYPERPARAMETERS, runners * environments * steps
     register_env(
@@ -203,28 +234,24 @@ def export(algorithm: Algorithm, normalisation: Normalisation, card: dict[str, A
     """The deterministic policy of the algorithm.
 
     Args:
-        algorithm: of :func:`make_algorithm`.
-        normalisation: of what it sees.
-        card: kept with it.
+        algorithm: algorithm of :func:`make_algorithm`.
+        normalisation: normalisation of what the policy sees.
+        card: card that is stored with the policy.
     """
     module: Any = algorithm.get_module()
     parts = [*module.encoder.actor_encoder.net.mlp, *module.pi.net.mlp]
     linear = [part for part in parts if isinstance(part, torch.nn.Linear)]
-    layers = [(_array(part.weight), _array(part.bias)) for part in linear]
+    layers = [(as_array64(part.weight), as_array64(part.bias)) for part in linear]
     return Policy(fold(layers, *normalisation), "tanh", False, card)
-
-
-def _array(tensor: torch.Tensor) -> np.ndarray:
-    return tensor.detach().cpu().numpy().astype(np.float64)
 
 
 def connect(address: str) -> None:
     """Connect to a Ray cluster, or start one on this machine.
 
-    A cluster's other machines get the sources from here; what they depend on has to be installed there.
+    A cluster's other machines receive the sources from here. The dependencies must be installed there.
 
     Args:
-        address: of the cluster, ``auto``, or ``local`` for a new one on this machine.
+        address: address of the cluster, ``auto``, or ``local`` for a new cluster on this machine.
     """
     if address == "local":
         ray.init(include_dashboard=False)
@@ -258,13 +285,12 @@ def main(
     if path.suffix != ".npz":
         raise typer.BadParameter(f"out = {path} must end with .npz")
     if path.exists():
-        raise typer.BadParameter(f"{path} exists already; choose another --out")
+        raise typer.BadParameter(f"{path} already exists; choose another --out")
     card = card_of("ppo on RLlib", [env], task, seed, HYPERPARAMETERS, ("ray", "torch"))
     connect(address)
     normalisation = measured_normalisation(env, task)
     algorithm = make_algorithm(env, task, seed, normalisation, runners, environments)
-    columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar:
+    with progress_bar(console) as bar:
         progress, done = bar.add_task("steps", total=steps), 0
         while done < steps:
             result = algorithm.train()

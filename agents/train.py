@@ -1,8 +1,8 @@
 """Train a driver or an allocator: ``python -m agents.train --algo ppo --env SharedControl/LaneKeeping-v0``.
 
-Training goes on in segments. Each begins from the checkpoint that the one before has left, with all random numbers
-seeded anew from the seed and the segment's number, so that a training that was killed and started again gives the
-same policy as one that was not.
+Training proceeds in segments. Each segment begins from the checkpoint of the segment before. All random numbers are
+then seeded again from the seed and the number of steps so far. A training that was killed and started again therefore
+gives the same policy as an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 import torch
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.noise import NormalActionNoise
@@ -30,32 +29,33 @@ from agents.card import card_of
 from agents.export import export
 from agents.hyperparameters import hyperparameters
 from agents.model_driver import ALGORITHMS
-from agents.policy import Policy
 from agents.tasks import TASKS, VALIDATION_SEED
 from agents.vec_envs import Timed, make_environment
 from shared_control_env.evaluation.catalogue import choose
 from shared_control_env.evaluation.interrupt import resumable
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.learned.policy import Policy
 from shared_control_env.registration import ENVIRONMENTS
 
 VALIDATION_EPISODES = 500
-"""Episodes, of seeds that training does not use, by which the best policy is chosen; failures are rare."""
+"""Number of episodes by which the best policy is chosen, with seeds not used in training; failures are rare."""
 
 EPSILON = 1e-6
-"""Variance added to that of every entry of what a policy sees; the least of them is twice as large."""
+"""Variance added to the variance of every entry of what a policy sees; the smallest of these is twice as large."""
 
 PROGRESS = "progress.json"
-"""What is done so far, beside the checkpoint."""
+"""File with the progress so far, in the folder of the checkpoint."""
 
 BEST = "best.npz"
-"""The best policy so far; its card is beside it as JSON."""
+"""File of the best policy so far; its card is stored beside it as JSON."""
 
 TENSORBOARD = "tensorboard"
-"""Folder of the log."""
+"""Folder of the TensorBoard log."""
 
 
 class Advance(BaseCallback):
-    """Tell the progress bar of every step.
+    """Callback that advances the progress bar at every step.
 
     Args:
         advance: called with the number of steps.
@@ -71,7 +71,13 @@ class Advance(BaseCallback):
 
 
 def validate(policy: Policy, ids: Sequence[str], task: str) -> float:
-    """Mean return over episodes with seeds kept for that."""
+    """Mean return over episodes with seeds reserved for validation.
+
+    Args:
+        policy: the policy.
+        ids: ids of the environments, each with an equal share of the episodes.
+        task: key of :data:`agents.tasks.TASKS`.
+    """
     episodes = VALIDATION_EPISODES - VALIDATION_EPISODES % len(ids)
     env = make_environment(ids, task, episodes, VALIDATION_SEED)
     observations: Any = env.reset()
@@ -85,17 +91,26 @@ def validate(policy: Policy, ids: Sequence[str], task: str) -> float:
 
 
 class Training:
-    """A training in a folder.
+    """A training, with its state in a folder.
 
     Args:
-        folder: of the checkpoint, the best policy and the log.
+        folder: folder of the checkpoint, the best policy and the log.
         algorithm: key of :data:`ALGORITHMS`.
-        ids: of the environments.
+        ids: ids of the environments.
         task: key of :data:`agents.tasks.TASKS`.
-        seed: of everything.
+        seed: seed of all random numbers.
+
+    Attributes:
+        folder, algorithm, ids, task, seed: as the arguments.
+        parameters: hyperparameters of the algorithm.
+        card: card of the training; see :mod:`agents.card`.
+        environments: number of environments.
+        segment: number of steps in a segment.
+        half_life: number of steps in which the learning rate halves.
+        state: progress, as stored in :data:`PROGRESS`.
 
     Raises:
-        ValueError: if the folder holds a training of something else.
+        ValueError: if the folder holds something else, such as a training with other arguments.
     """
 
     def __init__(self, folder: Path, algorithm: str, ids: Sequence[str], task: str, seed: int) -> None:
@@ -119,11 +134,15 @@ class Training:
             raise ValueError(f"{folder} holds files that are no training; choose another --out")
 
     def _kept(self, suffix: str) -> Path:
-        """A file of the state after the last whole segment."""
+        """A file of the state after the last complete segment."""
         return self.folder / f"checkpoint-{self.state['steps']}{suffix}"
 
     def run_segment(self, advance: Callable[[int], None]) -> None:
-        """Learn one segment, and keep checkpoint, score and, if it is the best, the policy."""
+        """Learn one segment, and store the checkpoint, the score and, if it is the best so far, the policy.
+
+        Args:
+            advance: called with the number of steps.
+        """
         (word,) = np.random.SeedSequence([self.seed, self.state["steps"]]).generate_state(1)
         segment_seed = int(word) % (VALIDATION_SEED - self.environments)
         self._begin()
@@ -131,9 +150,9 @@ class Training:
         timed: Any = unwrap_vec_wrapper(bare, Timed)
         env = self._normalised(bare)
         model = self._model(env)
-        torch.set_num_threads(1)  # the networks are small: more threads wait for one another
+        torch.set_num_threads(1)  # the networks are small: more threads only wait for each other
         set_random_seed(segment_seed)
-        env.seed(segment_seed)  # making or loading the model has seeded them with the model's own seed
+        env.seed(segment_seed)  # the model has seeded them with its own seed
         begin = time.perf_counter()
         model.learn(
             self.segment,
@@ -147,7 +166,7 @@ class Training:
         self._keep(model, env)
 
     def _begin(self) -> None:
-        """Mark the folder as a training's before its first segment is done, and drop the log of one that was not."""
+        """Mark the folder as a training before the first segment is complete, and drop the log of an incomplete one."""
         if self.state["steps"] == 0:
             shutil.rmtree(self.folder / TENSORBOARD, ignore_errors=True)
             self._note_progress()
@@ -156,9 +175,9 @@ class Training:
         write_atomically(self.folder / PROGRESS, lambda draft: draft.write_text(json.dumps(self.state, indent=1)))
 
     def _normalised(self, env: VecEnv) -> VecNormalize:
-        """Observations by their running mean and standard deviation, those of the checkpoint to begin with."""
+        """Observations normalised by their running mean and standard deviation, which continue from the checkpoint."""
         if self.state["steps"] == 0:
-            # The epsilon keeps an entry that never changes, such as a straight road's curvature, from being blown up.
+            # The epsilon limits the gain of a constant entry, such as the curvature of a straight road.
             return VecNormalize(env, norm_reward=False, clip_obs=np.inf, epsilon=EPSILON)
         return VecNormalize.load(str(self._kept("-normalisation.pkl")), env)
 
@@ -180,7 +199,7 @@ class Training:
         return model
 
     def _keep(self, model: Any, normalisation: VecNormalize) -> None:
-        """Write what a segment gave; the progress last, so that a kill leaves the state before."""
+        """Store the results of a segment; the progress is written last, so that a kill leaves the state before."""
         before = set(self.folder.glob("checkpoint-*"))
         policy = export(model, normalisation, {**self.card, "steps": model.num_timesteps})
         policy.card["score"] = reached = validate(policy, self.ids, self.task)
@@ -234,12 +253,17 @@ def main(
 
 
 def run(training: Training, steps: int, console: Console) -> None:
-    """Learn segments until there are so many steps, and show it."""
-    columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    """Learn segments until the number of steps is reached, and show the progress.
+
+    Args:
+        training: the training.
+        steps: number of steps in all [-].
+        console: where the progress is shown.
+    """
     whole = -(-steps // training.segment) * training.segment
     if whole > steps:
         console.print(f"{steps:,} steps are rounded up to {whole:,}: segments of {training.segment:,} are learned.")
-    with Progress(*columns, console=console) as bar:
+    with progress_bar(console) as bar:
         progress = bar.add_task("steps", total=whole, completed=training.state["steps"])
         while training.state["steps"] < steps:
             training.run_segment(lambda n: bar.advance(progress, n))

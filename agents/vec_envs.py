@@ -1,4 +1,4 @@
-"""Vectorised environments as training takes them: of several scenarios as one, and as a policy sees them."""
+"""Vectorised environments for training: several scenarios joined, with the observations that a policy sees."""
 
 from __future__ import annotations
 
@@ -10,30 +10,33 @@ import gymnasium as gym
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 
-from agents.history import HISTORY, History
 from agents.tasks import training_config
-from agents.views import ACTION_OF, FEATURES_OF, driver_view, view
+from shared_control_env.learned.history import HISTORY, History
+from shared_control_env.learned.views import ACTION_OF, FEATURES_OF, driver_view, view
 from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
 
 
 class JoinedVecEnv(VecEnv):
-    """Vectorised environments with the same spaces, one after the other.
+    """Several vectorised environments with the same spaces as one vectorised environment.
 
     Args:
-        parts: the environments.
+        parts: the vectorised environments.
+
+    Attributes:
+        parts: the vectorised environments.
 
     Raises:
-        ValueError: if there are none, or their spaces differ.
+        ValueError: if there are no parts, or their spaces differ.
     """
 
     def __init__(self, parts: Sequence[VecEnv]) -> None:
         if not parts:
-            raise ValueError("parts must name at least one environment")
+            raise ValueError("parts must hold at least one environment")
         self.parts = list(parts)
         first = self.parts[0]
         for part in self.parts:
             if (part.observation_space, part.action_space) != (first.observation_space, first.action_space):
-                raise ValueError(f"{part} has other spaces than {first}")
+                raise ValueError(f"the spaces of {part} differ from those of {first}")
         self._edges = np.cumsum([0, *(part.num_envs for part in self.parts)]).tolist()
         self.render_mode = first.render_mode
         super().__init__(self._edges[-1], first.observation_space, first.action_space)
@@ -43,7 +46,11 @@ class JoinedVecEnv(VecEnv):
             yield part, slice(begin, end)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seeds of the next reset, counted on from one part to the next."""
+        """Set the seeds of the next reset; they are counted on from one part to the next.
+
+        Args:
+            seed: seed of the first environment, or None.
+        """
         return [
             own for part, where in self._slices() for own in part.seed(None if seed is None else seed + where.start)
         ]
@@ -55,7 +62,11 @@ class JoinedVecEnv(VecEnv):
         return np.concatenate(observations)
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions for :meth:`step_wait`."""
+        """Store the actions for :meth:`step_wait`.
+
+        Args:
+            actions: actions of all environments, shape (N, n).
+        """
         for part, where in self._slices():
             part.step_async(actions[where])
 
@@ -71,34 +82,57 @@ class JoinedVecEnv(VecEnv):
             part.close()
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Pictures of all parts."""
+        """Pictures of all environments."""
         return [image for part in self.parts for image in part.get_images()]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of each environment."""
+        """An attribute of each environment.
+
+        Args:
+            attr_name: name of the attribute.
+            indices: indices of the environments; None for all.
+        """
         values = [value for part in self.parts for value in part.get_attr(attr_name)]
         return [values[i] for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused, as by the parts."""
+        """Setting an attribute; the parts refuse it.
+
+        Args:
+            attr_name: name of the attribute.
+            value: its value.
+            indices: indices of the environments; None for all.
+        """
         self.parts[0].set_attr(attr_name, value, indices)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Refused, as by the parts."""
+        """Calling a method of the environments; the parts refuse it.
+
+        Args:
+            method_name: name of the method.
+            args, kwargs: its arguments.
+            indices: indices of the environments; None for all.
+        """
         return self.parts[0].env_method(method_name, *args, indices=indices, **kwargs)
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: Any = None) -> list[bool]:
-        """No environment is wrapped."""
+        """False for every environment, since none is wrapped.
+
+        Args:
+            wrapper_class: class of the wrapper; not used.
+            indices: indices of the environments; None for all.
+        """
         return [False for _ in self._get_indices(indices)]
 
 
 class TaskView(VecEnvWrapper):
-    """The kernel's environments as a task's policy sees them.
+    """The kernel's environments as the policy of a task sees them.
 
-    At the end of an episode nothing is felt or planned any more: the terminal observation has that of the last step.
+    After the end of an episode there is no felt or planned command any more. The terminal observation therefore holds
+    that of the last step.
 
     Args:
-        env: with the task's slot open.
+        env: environments with the task's slot open.
         task: key of :data:`agents.tasks.TASKS`.
     """
 
@@ -117,7 +151,11 @@ class TaskView(VecEnvWrapper):
         return self._view(self.venv.reset())
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Keep the actions for :meth:`step_wait`."""
+        """Store the actions for :meth:`step_wait`.
+
+        Args:
+            actions: actions of the policy in [-1, 1], shape (N, n).
+        """
         self.venv.step_async(ACTION_OF[self._task](actions))
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
@@ -134,10 +172,10 @@ class TaskView(VecEnvWrapper):
 
 
 class WithHistory(VecEnvWrapper):
-    """Observations with the history before them, see :class:`agents.history.History`.
+    """Observations with their history; see :class:`shared_control_env.learned.history.History`.
 
     Args:
-        env: the environment.
+        env: the vectorised environment.
     """
 
     def __init__(self, env: VecEnv) -> None:
@@ -164,10 +202,10 @@ class Timed(VecEnvWrapper):
     """Measures the time that the environment takes.
 
     Args:
-        env: the environment.
+        env: the vectorised environment.
 
     Attributes:
-        seconds: spent in ``step_wait`` so far [s].
+        seconds: time spent in ``step_wait`` so far [s].
     """
 
     def __init__(self, env: VecEnv) -> None:
@@ -187,16 +225,16 @@ class Timed(VecEnvWrapper):
 
 
 def make_environment(ids: Sequence[str], task: str, num_envs: int, seed: int) -> VecEnv:
-    """Environments of a task for Stable-Baselines3, with the history stacked and episodes monitored.
+    """Environments of a task for Stable-Baselines3, with stacked history and monitored episodes.
 
     Args:
-        ids: of registered environments, each with an equal share.
+        ids: ids of registered environments, each with an equal share.
         task: key of :data:`TASKS`.
-        num_envs: how many, a multiple of the number of ids.
-        seed: of the first one; the others follow.
+        num_envs: number of environments, a multiple of the number of ids.
+        seed: seed of the first environment; the others follow.
 
     Raises:
-        ValueError: if the ids cannot share them equally.
+        ValueError: if ``num_envs`` is not a multiple of the number of ids.
     """
     if num_envs % len(ids):
         raise ValueError(f"num_envs = {num_envs} must be a multiple of the {len(ids)} environments that share them")
@@ -208,7 +246,7 @@ def make_environment(ids: Sequence[str], task: str, num_envs: int, seed: int) ->
 
 
 def _kernel(id: str, task: str, num_envs: int) -> VecEnv:
-    """Environments of one scenario."""
+    """Environments of one scenario, as the policy of a task sees them."""
     bound: Any = {"limiter": task == "driver", "driver": task == "allocator"}
     config = training_config(id, task)
     env = StableBaselinesVecEnv(gym.make_vec(id, num_envs=num_envs, autoreset_mode="same_step", config=config, **bound))

@@ -1,1 +1,1 @@
-"""Speed, printed as ratios against peers measured in the same run; nothing here is a test."""
+"""Measurements of speed, printed as ratios to peers measured in the same run; nothing here is a test."""

@@ -1,4 +1,4 @@
-"""Solvers against SciPy on the same compiled cost, their gap to the optimum, and the OSQP driver's time."""
+"""Solvers against SciPy on the same compiled cost, their gap to the optimum, and the time of the OSQP driver."""
 
 from __future__ import annotations
 
@@ -20,13 +20,24 @@ from shared_control_env.wrappers import DriverModel
 def solve_automation(
     U: np.ndarray, scene: Any, parameters: Any, iterations: int, work: Any
 ) -> tuple[int, int, float, float]:
-    """:func:`core.control.automation.solve`, records as 0-d arrays."""
+    """Call :func:`core.control.automation.solve` with records as 0-d arrays.
+
+    Args:
+        U: commands, start and result [m/s^2, rad], shape (MAX_CONTROL, 2).
+        scene, parameters, work: records as 0-d arrays.
+        iterations: number of Gauss-Newton iterations.
+    """
     return solve(U, scene[()], parameters[()], iterations, work[()])
 
 
 @jit
 def automation_cost(U: np.ndarray, scene: Any, parameters: Any, work: Any) -> float:
-    """:func:`core.control.automation.cost`, records as 0-d arrays."""
+    """Call :func:`core.control.automation.cost` with records as 0-d arrays.
+
+    Args:
+        U: commands [m/s^2, rad], shape (MAX_CONTROL, 2).
+        scene, parameters, work: records as 0-d arrays.
+    """
     return cost(U, scene[()], parameters[()], work[()])
 
 
@@ -34,8 +45,8 @@ class Gaps(NamedTuple):
     """Relative cost gap to the converged optimum, 95th percentile.
 
     Attributes:
-        cold: from zero, with the iterations of the first step.
-        warm: from the solution of the step before, with the iterations of later steps.
+        cold: gap from a start at zero, with the iterations of the first step [-].
+        warm: gap from the solution of the step before, with the iterations of later steps [-].
     """
 
     cold: float
@@ -43,7 +54,11 @@ class Gaps(NamedTuple):
 
 
 def scenes(count: int) -> list[np.ndarray]:
-    """Scenes of a closed loop with degraded automation, from random starts."""
+    """Scenes of a closed loop with a degraded automation, from random starts.
+
+    Args:
+        count: number of scenes.
+    """
     rng = np.random.default_rng(0)
     found: list[np.ndarray] = []
     while len(found) < count:
@@ -59,13 +74,21 @@ def scenes(count: int) -> list[np.ndarray]:
 
 
 def parameters_and_limits() -> tuple[np.ndarray, np.ndarray]:
-    """Packed parameters of the environment, and the scale of the commands."""
+    """Packed parameters of the environment, and the limits of the commands."""
     env = gym.make("SharedControl/TwoLane-v0").unwrapped
     return env.parameters, env.command_limits  # type: ignore[attr-defined]
 
 
 def automation(found: list[np.ndarray], repeats: int) -> tuple[Timing, Timing, Gaps]:
-    """Two Gauss-Newton iterations and SLSQP to convergence, and the gaps in cost."""
+    """Time two Gauss-Newton iterations, and SLSQP to convergence, and measure the gaps in cost.
+
+    Args:
+        found: scenes of :func:`scenes`.
+        repeats: number of repeats of the timings.
+
+    Returns:
+        Time of the Gauss-Newton iterations, time of SLSQP, and the gaps.
+    """
     parameters, scale = parameters_and_limits()
     work, U = np.zeros((), WORKSPACE), np.zeros((MAX_CONTROL, 2))
     H_c = int(parameters["automation"]["H_c"])
@@ -112,7 +135,11 @@ def automation(found: list[np.ndarray], repeats: int) -> tuple[Timing, Timing, G
 
 
 def osqp_driver(episodes: int) -> Timing:
-    """Condensing and solving the driver's program at eps 1e-5 along closed-loop episodes of both cases."""
+    """Time of condensing and solving the driver's program at eps = 1e-5 in closed-loop episodes of both cases.
+
+    Args:
+        episodes: number of episodes of each case.
+    """
     seconds = []
     for name in ("SharedControl/TwoLane-v0", "SharedControl/Curve-v0"):
         env = DriverModel(gym.make(name, config={"authority": {"law": "proportional"}}))

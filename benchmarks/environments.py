@@ -1,4 +1,4 @@
-"""Steps of the environments against highway-env's own."""
+"""Speed of the environments compared with highway-env's own environment."""
 
 from __future__ import annotations
 
@@ -14,11 +14,17 @@ from benchmarks.timing import Timing, time_block
 from shared_control_env.wrappers import DriverModel
 
 STEPS = 200
-"""Steps of one measured block."""
+"""Number of steps of one measured block."""
 
 
 def stepper(env: gym.Env, action: Callable[[], object], steps: int) -> Callable[[], int]:
-    """A block of steps that resets where an episode ends."""
+    """A block of steps that resets the environment when an episode ends.
+
+    Args:
+        env: the environment.
+        action: function that gives the action of a step.
+        steps: number of steps of the block.
+    """
     env.reset(seed=0)
 
     def block() -> int:
@@ -32,7 +38,7 @@ def stepper(env: gym.Env, action: Callable[[], object], steps: int) -> Callable[
 
 
 def highway_config() -> dict[str, Any]:
-    """highway-env with 4 vehicles, ContinuousAction (dynamical), Kinematics, 20 Hz simulation and policy."""
+    """Settings of highway-env: 4 vehicles, ContinuousAction (dynamical), Kinematics, 20 Hz simulation and policy."""
     return {
         "vehicles_count": 3,
         "lanes_count": 2,
@@ -45,7 +51,11 @@ def highway_config() -> dict[str, Any]:
 
 
 def highway(repeats: int) -> Timing:
-    """highway-env's own environment with :func:`highway_config`."""
+    """Time of a step of highway-env's own environment with :func:`highway_config`.
+
+    Args:
+        repeats: number of measured blocks.
+    """
     gym.register_envs(highway_env)
     env = gym.make("highway-v0", config=highway_config())
     env.action_space.seed(0)
@@ -53,7 +63,11 @@ def highway(repeats: int) -> Timing:
 
 
 def limited(repeats: int) -> Timing:
-    """TwoLane-v0: limiter, triangulation at every step, random driver actions."""
+    """Time of a step of TwoLane-v0 with limiter, triangulation at every step, and random driver actions.
+
+    Args:
+        repeats: number of measured blocks.
+    """
     gym.register_envs(shared_control_env)
     env = gym.make("SharedControl/TwoLane-v0")
     env.action_space.seed(0)
@@ -61,6 +75,10 @@ def limited(repeats: int) -> Timing:
 
 
 def closed_loop(repeats: int) -> Timing:
-    """TwoLane-v0 with the OSQP driver bound too."""
+    """Time of a step of TwoLane-v0 with the limiter and the OSQP driver bound.
+
+    Args:
+        repeats: number of measured blocks.
+    """
     env = DriverModel(gym.make("SharedControl/TwoLane-v0"))
     return time_block(stepper(env, lambda: np.int64(0), STEPS), repeats)

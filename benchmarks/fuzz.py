@@ -1,8 +1,8 @@
-"""Random and hostile input: ``python -m benchmarks.fuzz`` tries it on the environments and says what was wrong.
+"""Random and invalid input: ``python -m benchmarks.fuzz`` runs the environments with it and reports every fault.
 
-A configuration is either refused by a ValueError or drives: the observation stays in its space, all signals are
-finite, an episode that is lost ends, and nothing takes long. Stopped, the command goes on where it was; a fault is
-shown with the command that tries it again by itself.
+A configuration must either be refused with a ValueError or run. If it runs, the observation stays in its space, all
+signals are finite, an episode whose state is lost ends, and the time is limited. An interrupted command resumes. A
+fault is shown with the command that repeats it alone.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ import gymnasium as gym
 import numpy as np
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 import shared_control_env  # noqa: F401
 from benchmarks.random_settings import random_config
 from shared_control_env.evaluation.episodes import source_digest
 from shared_control_env.evaluation.interrupt import resumable
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.wrappers import DriverModel
@@ -32,25 +32,28 @@ PATIENCE = 5.0
 """Longest time that one configuration may take [s]."""
 
 STEPS = 8
-"""Steps that a configuration is driven in the single environment."""
+"""Number of steps of a configuration in the single environment."""
 
 BATCH, LENGTH = 64, 50
-"""Environments, and steps of each, that a configuration is driven in the kernel."""
+"""Number of environments, and of steps of each, for a configuration in the kernel."""
 
 SAVED_EVERY = 50
-"""Configurations between two notes of what is done."""
+"""Number of configurations after which the progress is saved."""
 
 IDS = list(ENVIRONMENTS)
 
 
 def try_single(rng: np.random.Generator) -> int:
-    """One configuration in the single environment, with the predictive driver half of the time.
+    """Try one configuration in the single environment, with the predictive driver half of the time.
+
+    Args:
+        rng: random generator.
 
     Returns:
-        Steps that it drove, 0 where it was refused.
+        Number of steps; 0 if the configuration was refused.
 
     Raises:
-        AssertionError: for what must not be.
+        AssertionError: if a signal, the observation or the time is not as required.
     """
     name, config = IDS[int(rng.integers(len(IDS)))], random_config(rng)
     begin = perf_counter()
@@ -75,7 +78,17 @@ def try_single(rng: np.random.Generator) -> int:
 
 
 def try_kernel(rng: np.random.Generator) -> int:
-    """One configuration in the kernel, for many steps; arguments and result as those of :func:`try_single`."""
+    """Try one configuration in the kernel, for many steps.
+
+    Args:
+        rng: random generator.
+
+    Returns:
+        Number of steps; 0 if the configuration was refused.
+
+    Raises:
+        AssertionError: if a signal, the observation or the time is not as required.
+    """
     name, config = IDS[int(rng.integers(len(IDS)))], random_config(rng, wrong=0.0)
     try:
         env: Any = gym.make_vec(name, num_envs=BATCH, config=config, threads=1, driver=bool(rng.integers(2)))
@@ -90,7 +103,7 @@ def try_kernel(rng: np.random.Generator) -> int:
         try:
             observation, reward, terminated, _, info = env.step(actions)
         except ValueError as error:
-            if "config" not in str(error):  # else an episode that cannot be drawn
+            if "config" not in str(error):  # a configuration whose episode cannot be drawn is no fault
                 raise
             break
         _check(observation, reward, info, terminated, f"{name}, {config!r}")
@@ -107,7 +120,7 @@ def _action(space: gym.Space, rng: np.random.Generator) -> Any:
 def _check(
     observation: np.ndarray, reward: np.ndarray, info: dict[str, Any], terminated: np.ndarray, what: str
 ) -> None:
-    """What holds of every step: bounded observations, finite signals, and an end where the state is lost."""
+    """Check a step: bounded observations, finite signals, and an end of the episode where the state is lost."""
     running = ~terminated
     assert (np.abs(observation[running] if observation.ndim > 1 else observation) <= 1.0).all() or not running.any(), (
         what
@@ -120,7 +133,7 @@ def _check(
 
 
 def _compile() -> None:
-    """Have all compiled before it is timed."""
+    """Compile everything before the first timing."""
     env = DriverModel(gym.make(IDS[0]))
     env.reset(seed=0)
     env.step(0)
@@ -129,11 +142,20 @@ def _compile() -> None:
 
 
 def attempt(what: str, seed: int, index: int) -> tuple[int, str]:
-    """One trial by its number: the steps that it drove, and what the fault is, if there is one."""
+    """Run one trial by its number.
+
+    Args:
+        what: ``single`` or ``kernel``.
+        seed: seed of all trials.
+        index: number of the trial.
+
+    Returns:
+        The number of steps, and a description of the fault; the description is empty if there is no fault.
+    """
     tries: dict[str, Callable[[np.random.Generator], int]] = {"single": try_single, "kernel": try_kernel}
     rng = np.random.default_rng([seed, index, list(tries).index(what)])
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of cars that would be unstable on a motorway, and of actions out of bounds
+        warnings.simplefilter("ignore")  # about unstable vehicles and actions out of bounds
         try:
             return tries[what](rng), ""
         except Exception as error:
@@ -157,14 +179,7 @@ def main(
     done = json.loads(path.read_text()) if path.exists() else {}
     wanted = {"single": ("tried", int(configs)), "kernel": ("steps", int(steps))}
     _compile()
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with resumable(path), Progress(*columns, console=console) as bar:
+    with resumable(path), progress_bar(console) as bar:
         for what, (counted, goal) in wanted.items():
             state = done.setdefault(what, {"tried": 0, "drove": 0, "steps": 0, "faults": []})
             task = bar.add_task(f"{what}: {counted}", total=goal)

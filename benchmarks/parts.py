@@ -1,4 +1,4 @@
-"""Cost of each part of a vectorised step, timed in compiled loops over situations of a closed loop."""
+"""Cost of each part of a vectorised step, timed in compiled loops over the situations of a closed loop."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from shared_control_env.core.world import vehicle as dynamics
 triangulate, search = TRIANGULATE.call, SEARCH.call
 
 N = 256
-"""Environments in one loop."""
+"""Number of environments in one loop."""
 
 
 @njit
@@ -117,14 +117,21 @@ PARTS: dict[str, Callable[..., None]] = {
 
 
 def _anew(batch: Batch, automations: np.ndarray, states: np.ndarray, run: Callable[[], None]) -> int:
-    """Run a loop from the same situations as before; how many there are."""
+    """Run a loop again from the same situations, and return their number."""
     batch.automations[:], batch.states[:] = automations, states
     run()
     return N
 
 
 def times(repeats: int) -> dict[str, Timing]:
-    """Time of each part for one environment."""
+    """Time of each part for one environment.
+
+    Args:
+        repeats: number of repeats.
+
+    Returns:
+        Time by the name of the part in :data:`PARTS`.
+    """
     found = {}
     for name, loop in PARTS.items():
         env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=N, threads=1)

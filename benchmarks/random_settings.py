@@ -1,4 +1,4 @@
-"""Random configurations over the whole schema of settings: valid, at the ends of their ranges, and wrong."""
+"""Random configurations over the whole schema of settings: valid values, ends of the ranges, and wrong values."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ WRONG: tuple[Any, ...] = (
     [1, 2],
     object(),
 )
-"""Values that hardly any setting takes."""
+"""Values that are wrong for almost every setting."""
 
 NUMPY: tuple[Callable[[float], Any], ...] = (
     np.float64,
@@ -35,15 +35,15 @@ NUMPY: tuple[Callable[[float], Any], ...] = (
     lambda x: np.array(x),
     lambda x: np.int64(round(x)),
 )
-"""Other types that numbers come in."""
+"""Conversions of a number to other numeric types."""
 
 
 def random_config(rng: np.random.Generator, wrong: float = 0.02) -> dict[str, Any]:
-    """Changes to settings: a few of them, of any section.
+    """Changes to a few settings of any section.
 
     Args:
-        rng: generator.
-        wrong: probability that a value is one of :data:`WRONG`.
+        rng: random generator.
+        wrong: probability that a value is one of :data:`WRONG` [-].
     """
     names = list(Settings.model_fields)
     chosen = rng.choice(len(names), size=int(rng.integers(1, 6)), replace=False)
@@ -54,7 +54,7 @@ def random_config(rng: np.random.Generator, wrong: float = 0.02) -> dict[str, An
 
 
 def _value(field: Any, rng: np.random.Generator, wrong: float, partial: bool = False) -> Any:
-    """A value for a field of a section; of a section alone some of its fields, if ``partial``."""
+    """A value for a field; for a whole section, a random subset of its fields if ``partial``."""
     if rng.random() < wrong:
         return WRONG[int(rng.integers(len(WRONG)))]
     bounds = {name: value for each in field.metadata for name, value in bounds_of(each)}
@@ -87,7 +87,7 @@ def _of_type(kind: Any, bounds: dict[str, Any], rng: np.random.Generator, wrong:
 
 
 def _number(bounds: dict[str, Any], rng: np.random.Generator, whole: bool) -> Any:
-    """A number: mostly of moderate size, sometimes at an end of its range or anywhere in it, in any numeric type."""
+    """A number of any numeric type: mostly of moderate size, sometimes at an end or anywhere in its range."""
     low, high = bounds.get("ge", bounds.get("gt", -20.0)), bounds.get("le", bounds.get("lt", 20.0))
     kind = rng.random()
     if kind < 0.1:

@@ -36,11 +36,11 @@ print(perf_counter() - begin)
 
 
 def vector_start(cold: bool, driver: bool = False) -> float:
-    """Seconds from the import to the end of the kernel's first step, in a new process.
+    """Time from the import to the end of the kernel's first step, in a new process [s].
 
     Args:
-        cold: with an empty numba cache, in a folder of its own.
-        driver: with the predictive driver bound.
+        cold: whether numba's cache is empty; it is then a temporary folder.
+        driver: whether the predictive driver is bound.
     """
     environment = dict(os.environ)
     with tempfile.TemporaryDirectory() as folder:
@@ -52,7 +52,14 @@ def vector_start(cold: bool, driver: bool = False) -> float:
 
 
 def first_step(repeats: int) -> tuple[Timing, Timing]:
-    """After the import, and with it; numba's caches are warm."""
+    """Time to the end of the first step in a new process, with warm numba caches.
+
+    Args:
+        repeats: number of measured processes; one more runs before, unmeasured.
+
+    Returns:
+        Time from the end of the import, and time from its beginning.
+    """
     times = []
     for _ in range(repeats + 1):
         result = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True)

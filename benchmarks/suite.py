@@ -1,4 +1,4 @@
-"""Episodes of the full suite through the kernel: how long 10,000 of them take."""
+"""Time of 10,000 episodes of the full suite in the kernel."""
 
 from __future__ import annotations
 
@@ -8,11 +8,20 @@ from time import perf_counter
 from shared_control_env.evaluation import evaluate
 
 DRIVERS, AUTHORITIES, SEEDS = ("mpc", "scripted"), ("paper", "linear"), 4
-"""What the episodes are made of: with the driver and the authority in the kernel, and in Python."""
+"""Drivers and authorities of the episodes, one of each in the kernel and one in Python, and the number of seeds."""
 
 
 def seconds_for(episodes: int, repeats: int, suite: str = "full") -> list[float]:
-    """Time that so many episodes of 10 s take, from the rate of smaller runs of the whole suite on all cores [s]."""
+    """Time of a number of episodes of 10 s, extrapolated from smaller runs of the whole suite on all cores [s].
+
+    Args:
+        episodes: number of episodes.
+        repeats: number of measured runs; one more runs before, unmeasured.
+        suite: name of the suite.
+
+    Returns:
+        One time per measured run.
+    """
     found = []
     for repeat in range(repeats + 1):
         begin = perf_counter()

@@ -1,4 +1,4 @@
-"""Repeated timings and their table."""
+"""Repeated timings and their percentiles."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Timing:
-    """Time of one call, from repeats.
+    """Time of one call, from repeated measurements.
 
     Attributes:
-        median: [s].
+        median: median [s].
         low: 10th percentile [s].
         high: 90th percentile [s].
     """
@@ -25,7 +25,11 @@ class Timing:
 
     @classmethod
     def of(cls, seconds: list[float] | np.ndarray) -> Timing:
-        """Percentiles of measured times."""
+        """Percentiles of measured times.
+
+        Args:
+            seconds: the times [s], shape (n,).
+        """
         low, median, high = np.percentile(seconds, [10, 50, 90])
         return cls(float(median), float(low), float(high))
 
@@ -37,8 +41,8 @@ def time_block(block: Callable[[], int], repeats: int) -> Timing:
     """Time of one unit of work.
 
     Args:
-        block: does some units of work and returns how many.
-        repeats: how often; one more goes before, unmeasured.
+        block: function that does some units of work and returns their number.
+        repeats: number of measured calls; one more call runs before, unmeasured.
     """
     block()
     seconds = []

@@ -1,4 +1,4 @@
-"""Steps of many environments: the kernel on one core and on all, and highway-env in processes."""
+"""Speed of many environments: the kernel on one core and on all cores, and highway-env in processes."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ SIZES = (1, 64, 1024, 4096)
 """Numbers of environments."""
 
 ITERATIONS = 2
-"""Gauss-Newton iterations of the automation in these timings."""
+"""Number of Gauss-Newton iterations of the automation in these timings."""
 
 BLOCK = 16_384
-"""Steps of one environment in a timing: enough that waking a thread or filling a cache once does not show."""
+"""Number of environment steps in a timing, large enough that waking a thread or filling a cache has no effect."""
 
 
 class Scaling(NamedTuple):
-    """Time of one environment's step on one core and on all.
+    """Time of one environment's step on one core and on all cores.
 
     Attributes:
-        one: on one core.
-        all: on all cores; None for one core or one environment.
-        ratio: how many times as many steps all make as one, median of the rounds; 1 where there is no ``all``.
+        one: time on one core.
+        all: time on all cores; None for one core or one environment.
+        ratio: speed of all cores relative to one core, median of the rounds; 1 if there is no ``all`` [-].
     """
 
     one: Timing
@@ -40,10 +40,16 @@ class Scaling(NamedTuple):
 
 
 def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/TwoLane-v0") -> Scaling:
-    """Random driver commands, or the driver's program in the kernel.
+    """Time the kernel with random driver commands, or with the driver's program in the kernel.
 
-    A round times every core by itself, and all together after each, since on a shared machine the cores differ, and
-    change their speeds from one second to the next; all environments get equally far in their episodes.
+    A round times every core alone, and all cores together after each of them. On a shared machine the cores differ, and
+    their speeds change within seconds. All environments advance equally far in their episodes.
+
+    Args:
+        num_envs: number of environments.
+        driver: whether the predictive driver is bound.
+        repeats: number of rounds.
+        id: id of the environment.
     """
     ours = cores()
     alone = _block(id, num_envs, 1, driver)
@@ -60,12 +66,12 @@ def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/T
 
 
 def _rate(seconds: list[float]) -> float:
-    """Mean steps a second of some times a step."""
+    """Mean rate in steps per second, from times per step."""
     return float(np.mean(1.0 / np.array(seconds)))
 
 
 def _block(id: str, num_envs: int, threads: int, driver: bool) -> Callable[[], float]:
-    """Some steps of new environments; the first are taken at once, unmeasured."""
+    """A timed block of steps of new environments; a first block runs at once, unmeasured."""
     config = {"solver": {"iterations": ITERATIONS}}
     env = gym.make_vec(id, num_envs=num_envs, threads=threads, driver=driver, config=config)
     env.reset(seed=0)
@@ -83,7 +89,7 @@ def _block(id: str, num_envs: int, threads: int, driver: bool) -> Callable[[], f
 
 
 def _on_core(core: int, block: Callable[[], float]) -> float:
-    """Time a block on one core, where the system lets us choose."""
+    """Time a block on one core, if the operating system supports the choice of a core."""
     if not hasattr(os, "sched_setaffinity"):
         return block()
     allowed = os.sched_getaffinity(0)
@@ -95,7 +101,11 @@ def _on_core(core: int, block: Callable[[], float]) -> float:
 
 
 def highway_processes(repeats: int) -> Timing:
-    """highway-env in one process a core, time of one environment's step."""
+    """Time of one environment's step of highway-env, with one process per core.
+
+    Args:
+        repeats: number of measured blocks.
+    """
     n = len(cores())
 
     def make() -> gym.Env:
@@ -119,7 +129,11 @@ def highway_processes(repeats: int) -> Timing:
 
 
 def metadrive(repeats: int) -> Timing | None:
-    """MetaDrive with little traffic and no rendering, where it is installed."""
+    """Time of a step of MetaDrive with little traffic and no rendering; None if it is not installed.
+
+    Args:
+        repeats: number of measured blocks.
+    """
     if find_spec("metadrive") is None:
         return None
     from metadrive import MetaDriveEnv  # type: ignore[import-not-found]

@@ -1,1 +1,1 @@
-"""Experiments: one file per figure or table of the paper, and the command that reproduces them all."""
+"""Experiments: one file for each figure or table of the paper, and the command that reproduces all of them."""

@@ -1,6 +1,6 @@
-"""The reference table: every authority with every driver on the full suite, and the finding in words.
+"""The reference table: every authority with every driver on the full suite, and the findings in words.
 
-``python -m experiments.benchmark`` runs it and writes the table that the README shows.
+``python -m experiments.benchmark`` runs the suite and writes the table that the README shows.
 """
 
 from __future__ import annotations
@@ -19,14 +19,21 @@ from shared_control_env.evaluation.statistics import intervals
 from shared_control_env.evaluation.storage import TABLE, write_atomically
 
 SHOWN = ("mpc", "internal_model", "scripted", "attentive", "hands_on", "hands_off", "none")
-"""Drivers of the README's table; the report has all of them."""
+"""Drivers in the README's table; the report has all drivers."""
 
 RESAMPLES = 2000
-"""Of the bootstrap."""
+"""Number of bootstrap resamples."""
 
 
 def failures_and_error(table: pd.DataFrame) -> pd.DataFrame:
-    """Share of episodes that end in a collision or off the road [%], and mean lateral RMS error [m], in one cell."""
+    """Share of episodes that end in a collision or off the road [%], and mean lateral RMS error [m], in one cell.
+
+    Args:
+        table: results of the benchmark, one row per episode.
+
+    Returns:
+        Text cells, authorities as rows and drivers as columns.
+    """
     groups = table.groupby(["authority", "driver"], sort=False)
     cells = groups[["terminated", "lateral_rms"]].mean()
     text = [f"{100.0 * rate:.1f} / {error:.2f}" for rate, error in cells.to_numpy(dtype=float).tolist()]
@@ -40,6 +47,15 @@ def difference(
     """Mean of a metric under one authority minus that under another, on the same episodes, and its 95 % interval.
 
     Pairs of episodes are resampled (percentile bootstrap).
+
+    Args:
+        table: results of the benchmark, one row per episode.
+        driver: name of the driver.
+        first, second: names of the authorities.
+        metric: column of the table.
+
+    Returns:
+        Mean, lower end and upper end of the interval.
     """
     one = table[table["driver"] == driver]
     keys = ["scenario", "degradation", "seed"]
@@ -51,7 +67,13 @@ def difference(
 
 
 def compared(table: pd.DataFrame, driver: str, first: str, second: str) -> str:
-    """A sentence on the failures under two authorities that says what the interval allows to be said."""
+    """A sentence on the failures under two authorities that claims no more than the interval supports.
+
+    Args:
+        table: results of the benchmark, one row per episode.
+        driver: name of the driver.
+        first, second: names of the authorities.
+    """
     change, low, high = (100.0 * value for value in difference(table, driver, first, second))
     numbers = f"{change:+.1f} percentage points (95 % interval {low:+.1f} to {high:+.1f})"
     if low <= 0.0 <= high:
@@ -63,7 +85,11 @@ def compared(table: pd.DataFrame, driver: str, first: str, second: str) -> str:
 
 
 def finding(table: pd.DataFrame) -> list[str]:
-    """What the table says, in sentences made from its numbers."""
+    """The findings as sentences that are built from the numbers of the table.
+
+    Args:
+        table: results of the benchmark, one row per episode.
+    """
     rates = 100.0 * table.groupby(["authority", "driver"])["terminated"].mean()
     healthy = 100.0 * table[table["degradation"] == "none"].groupby("authority")["terminated"].mean()
     worst = 100.0 * table[table["authority"] == "none"].groupby("degradation")["terminated"].mean()
@@ -101,7 +127,11 @@ def finding(table: pd.DataFrame) -> list[str]:
 
 
 def as_markdown(table: pd.DataFrame) -> str:
-    """Table of the drivers shown, and the finding, in Markdown."""
+    """The table of the drivers in :data:`SHOWN`, and the findings, in Markdown.
+
+    Args:
+        table: results of the benchmark, one row per episode.
+    """
     square = failures_and_error(table[table["driver"].isin(SHOWN)])
     rows = [f"| {name} | " + " | ".join(row) + " |" for name, row in zip(square.index, square.to_numpy(), strict=True)]
     lines = [

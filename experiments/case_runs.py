@@ -1,4 +1,4 @@
-"""Closed-loop runs of the paper's cases: which there are, and their signals as a table."""
+"""Closed-loop runs of the paper's cases: the list of runs, and their signals as a table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.wrappers import DriverModel
 
 SEED = 0
-"""Seed of every run; the cases draw nothing at random, so that it changes nothing."""
+"""Seed of every run; it has no effect, since the cases draw no random numbers."""
 
 SCENARIOS = {1: "SharedControl/TwoLane-v0", 2: "SharedControl/Curve-v0"}
 PRESETS = ("graded", "paper")
@@ -31,7 +31,7 @@ SIGNAL_COLUMNS = {
     "prediction": ("x_pred", "y_pred_cartesian"),
     "prediction_road": ("s_pred", "y_pred"),
 }
-"""Columns made of the array-valued signals of ``info``."""
+"""Columns made from the array-valued signals of ``info``."""
 
 SCALAR_COLUMNS = (
     "k",
@@ -55,7 +55,7 @@ class Run:
         case: 1 or 2.
         law: authority law.
         preset: preset of the longitudinal risk.
-        driver: whether the driver takes part; without, the degraded automation drives alone.
+        driver: whether the driver takes part; if not, the degraded automation drives alone.
     """
 
     case: int
@@ -71,7 +71,7 @@ class Run:
 
     @property
     def config(self) -> dict[str, Any]:
-        """Settings that differ from the case's own."""
+        """Settings that differ from the case's own settings."""
         config: dict[str, Any] = {
             "authority": {"law": self.law},
             "longitudinal_risk": {"preset": self.preset},
@@ -88,20 +88,27 @@ def all_runs() -> list[Run]:
 
 
 def make(run: Run, render_mode: str | None = None, **config: Any) -> gym.Env:
-    """The paper's closed loop of a run: limiter and predictive driver bound."""
+    """The paper's closed loop of a run, with the limiter and the predictive driver bound.
+
+    Args:
+        run: the run.
+        render_mode: ``human``, ``rgb_array`` or None.
+        config: further settings.
+    """
     env = gym.make(SCENARIOS[run.case], config={**run.config, **config}, render_mode=render_mode)
     return DriverModel(env)
 
 
 def simulate(run: Run, **config: Any) -> pd.DataFrame:
-    """Signals of one run.
+    """Simulate one run.
 
     Args:
-        run: which.
+        run: the run.
         config: further settings.
 
     Returns:
-        One row a time step: the signals of ``info``, the gap to the preceding vehicle, the ends.
+        One row per time step: the signals of ``info``, the gap to the preceding vehicle, the reward, and whether the
+        episode terminated.
     """
     env = make(run, **config)
     env.reset(seed=SEED)
@@ -130,7 +137,7 @@ def _row(info: dict[str, Any]) -> dict[str, Any]:
 
 
 def _gap(env: gym.Env) -> float:
-    """Distance of the centres to the preceding vehicle along the road [m]."""
+    """Distance between the centres of the ego and the preceding vehicle along the road [m]; NaN without one."""
     scene = env.unwrapped.scene  # type: ignore[attr-defined]
     present, s_preceding = scene["neighbours"][2, :2]
     return float(s_preceding - scene["z"][0]) if present else np.nan

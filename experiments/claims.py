@@ -1,8 +1,8 @@
-"""What the paper asserts of its results, each as a number taken from the runs, with a verdict.
+"""The paper's assertions about its results, each as a number taken from the runs, with a verdict.
 
-The assertions are put in our words; the place in the paper is named. Thresholds for words such as "small" are
-ours and are part of the check. A claim is judged with the printed longitudinal risk (preset ``paper``) and with
-the ``graded`` one.
+The assertions are reworded here, and the place in the paper is named. The paper gives no thresholds for words such
+as "small". The thresholds here are our choice and part of the check. Each claim is judged with the printed
+longitudinal risk (preset ``paper``) and with the ``graded`` one.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ HOLDS, HOLDS_GRADED, FAILS = "holds", "holds with graded risk", "does not hold"
 
 ONSET = {1: 0.5, 2: 0.25}
 FULL = {1: 1.5, 2: 0.5}
-"""Times at which each case's degradation begins and is complete [s]."""
+"""Times at which the degradation of each case begins and is complete [s]."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +37,13 @@ class Claim:
     Attributes:
         name: short name.
         case: 1, 2, or 0 for the method itself.
-        source: where the paper says so.
-        says: what it says, in our words.
-        check: how that is put to a number.
-        unit: of the number.
-        measure: the number, from the runs and the preset of the longitudinal risk.
+        source: place in the paper.
+        says: the assertion, reworded.
+        check: description of the number that tests the assertion.
+        unit: unit of the number.
+        measure: function that gives the number from the runs and the preset of the longitudinal risk.
         bound: threshold.
-        at_most: whether the number must not exceed the bound, or not fall below it.
+        at_most: True if the number must not exceed the bound; False if it must not fall below the bound.
     """
 
     name: str
@@ -57,7 +57,11 @@ class Claim:
     at_most: bool
 
     def passes(self, value: float) -> bool:
-        """Whether a number meets the bound; NaN never does."""
+        """Whether a number meets the bound; NaN never does.
+
+        Args:
+            value: the number, in the claim's unit.
+        """
         return value <= self.bound if self.at_most else value >= self.bound
 
 
@@ -78,7 +82,7 @@ def _after(table: pd.DataFrame, case: int, since: Mapping[int, float] = FULL) ->
 
 
 def _rank_correlation(a: pd.Series, b: pd.Series) -> float:
-    """Spearman's rank correlation of values to three decimals; NaN where either is constant to that."""
+    """Spearman's rank correlation of values rounded to three decimals; NaN if either is then constant."""
     a, b = a.round(3), b.round(3)
     if a.nunique() < 2 or b.nunique() < 2:
         return float("nan")
@@ -86,7 +90,7 @@ def _rank_correlation(a: pd.Series, b: pd.Series) -> float:
 
 
 def _scaled(table: pd.DataFrame, first: str, second: str | None = None) -> float:
-    """Largest command, or difference of two commands, over its limit, of both channels."""
+    """Largest command, or difference of two commands, relative to its limit, over both channels."""
     limits = Limits()
     largest = 0.0
     for channel, bound in (("a", limits.a_max), ("delta", limits.delta_max)):
@@ -301,7 +305,7 @@ def judge(runs: Runs) -> list[dict[str, Any]]:
         runs: signals of all runs.
 
     Returns:
-        One plain dict a claim.
+        One plain dict per claim.
     """
     rows = []
     for claim in CLAIMS:
@@ -327,12 +331,22 @@ def judge(runs: Runs) -> list[dict[str, Any]]:
 
 
 def as_json(rows: list[dict[str, Any]], provenance: dict[str, Any]) -> str:
-    """Claims with versions and seed, as JSON."""
+    """Claims with versions and seed, as JSON.
+
+    Args:
+        rows: result of :func:`judge`.
+        provenance: versions and seed.
+    """
     return json.dumps({"provenance": provenance, "claims": rows}, indent=2) + "\n"
 
 
 def as_markdown(rows: list[dict[str, Any]], provenance: dict[str, Any]) -> str:
-    """Claims as a page to read."""
+    """Claims as a Markdown page.
+
+    Args:
+        rows: result of :func:`judge`.
+        provenance: versions and seed.
+    """
     counts = {verdict: sum(row["verdict"] == verdict for row in rows) for verdict in (HOLDS, HOLDS_GRADED, FAILS)}
     lines = [
         "# Claims of the paper, checked on this run",
@@ -367,10 +381,10 @@ def as_markdown(rows: list[dict[str, Any]], provenance: dict[str, Any]) -> str:
 
 
 def _row(*cells: str) -> str:
-    """A row of a Markdown table; a bar within a cell is not one of its borders."""
+    """A row of a Markdown table; vertical bars within a cell are escaped."""
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def _number(value: float | None) -> str:
-    """Three digits; what is left of zero by rounding is 0."""
+    """Number with three significant digits; a residue below 1e-12 is shown as 0."""
     return "-" if value is None else "0" if abs(value) < 1e-12 else f"{value:.3g}"

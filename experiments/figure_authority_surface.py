@@ -1,4 +1,4 @@
-"""Figure 7: the authority alpha_a over both risks."""
+"""Figure 7: the authority alpha_a as a function of both risks."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from shared_control_env.core.authority.fuzzy import OPERATORS, authority
 
 
 def draw(path: Path) -> None:
-    """One panel for each choice of the operators.
+    """Draw one panel for each choice of the operators.
 
     Args:
-        path: of the picture.
+        path: file of the picture.
     """
     risks = np.linspace(0.0, 1.0, 101)
     with style.figure(path, 1, 2, (10.0, 4.0)) as (fig, axes):

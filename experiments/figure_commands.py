@@ -1,4 +1,4 @@
-"""Figures 10 and 13: acceleration and steering of automation and driver."""
+"""Figures 10 and 13: acceleration and steering of the automation and the driver."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from experiments.figure_risk import ONSET
 
 
 def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
-    """Two panels, acceleration and steering: des, f and act of the automation, des and act of the driver.
+    """Draw acceleration and steering in two panels: des, f and act of the automation; des and act of the driver.
 
     Args:
         runs: signals of all runs.
         case: 1 or 2.
-        path: of the picture.
+        path: file of the picture.
     """
     table = runs[Run(case, "paper", "graded")]
     with style.figure(path, 1, 2, (12.0, 4.0)) as (fig, axes):

@@ -1,4 +1,4 @@
-"""Figure 5: the dynamic potential field over distance and relative speed, and the risk made of it."""
+"""Figure 5: the dynamic potential field over distance and relative speed, and the resulting risk."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from shared_control_env.core.parameters import LongitudinalRiskParameters
 from shared_control_env.core.risk.longitudinal import dynamic_field, pair_risk, safe_distance
 
 V_OBSTACLE = 12.0
-"""Speed of the obstacle [m/s], that of Case 1's preceding vehicle."""
+"""Speed of the obstacle, equal to that of the preceding vehicle in Case 1 [m/s]."""
 
 
 def draw(path: Path) -> None:
-    """For each preset, the field U^d and the ratio of Eq. 7.
+    """Draw the field U^d and the ratio of Eq. 7 for each preset.
 
     Args:
-        path: of the picture.
+        path: file of the picture.
     """
     distances = np.linspace(-30.0, 30.0, 201)
     speeds = np.linspace(-5.0, 5.0, 101)

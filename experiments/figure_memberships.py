@@ -17,10 +17,10 @@ PANELS = (
 
 
 def draw(path: Path) -> None:
-    """Three panels, one for each variable.
+    """Draw three panels, one for each variable.
 
     Args:
-        path: of the picture.
+        path: file of the picture.
     """
     values = np.linspace(0.0, 1.0, 401)
     with style.figure(path, 1, 3, (12.0, 2.8)) as (_, axes):

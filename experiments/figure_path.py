@@ -1,4 +1,4 @@
-"""Figures 8 and 11: the ego's path with safe area and CTRA prediction."""
+"""Figures 8 and 11: the ego's path with the safe area and the CTRA prediction."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from experiments.case_runs import Run, make
 from shared_control_env.core.world.road import point_at
 
 EVERY = 25
-"""Time steps between the drawn safe areas and predictions."""
+"""Number of time steps between two drawn safe areas and predictions."""
 
 
 def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
-    """One panel for the paper's law, one for all laws.
+    """Draw one panel for the paper's law, and one for all laws.
 
     Args:
         runs: signals of all runs.
         case: 1 or 2.
-        path: of the picture.
+        path: file of the picture.
     """
     main = Run(case, "paper", "graded")
     line = make(main).unwrapped.line  # type: ignore[attr-defined]
@@ -39,7 +39,7 @@ def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
         first.set_title(f"Case {case}: safe area and prediction, law of Eq. 10")
         _draw_road(second, line, table["s"].max() + 30.0)
         shown = [run for run in runs if run.case == case and run.preset == "graded"]
-        # Paths that coincide stay visible: wide ones first, the paper's law last and dashed.
+        # Wide lines are drawn first, and the paper's law last and dashed, so that coinciding paths stay visible.
         for i, run in enumerate(sorted(shown, key=lambda run: run == main)):
             signals = runs[run]
             who = run.law if run.driver else "automation_alone"
@@ -73,7 +73,7 @@ def _draw_road(axis: Axes, line: np.ndarray, end: float) -> None:
 
 
 def _draw_moment(axis: Axes, line: np.ndarray, row: pd.Series, label: bool) -> None:
-    """Safe area and prediction of one time step."""
+    """Draw the safe area and the prediction of one time step."""
     lower, upper = (np.asarray(row[f"safe_area_{side}"]).reshape(-1, 2) for side in ("lower", "upper"))
     outline = np.vstack([_resampled(lower), _resampled(upper)[::-1]])
     points = np.array([point_at(line, s, d)[:2] for s, d in outline])
@@ -95,6 +95,6 @@ def _draw_moment(axis: Axes, line: np.ndarray, row: pd.Series, label: bool) -> N
 
 
 def _resampled(chain: np.ndarray) -> np.ndarray:
-    """A boundary with many points, so that it bends with the road."""
+    """A boundary with many points, so that the drawn boundary follows the curve of the road."""
     pieces = [np.linspace(a, b, 20) for a, b in zip(chain[:-1], chain[1:], strict=True) if (a != b).any()]
     return np.vstack(pieces)

@@ -13,12 +13,12 @@ ONSET = {1: 0.5, 2: 0.25}
 
 
 def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
-    """Three panels: both risks, alpha_a and v_x, for both presets of the longitudinal risk.
+    """Draw both risks, alpha_a and v_x in three panels, for both presets of the longitudinal risk.
 
     Args:
         runs: signals of all runs.
         case: 1 or 2.
-        path: of the picture.
+        path: file of the picture.
     """
     with style.figure(path, 1, 3, (12.0, 3.4)) as (fig, axes):
         risk, authority, velocity = axes[0]

@@ -1,6 +1,6 @@
-"""Key figures of all runs, and the expected ones that the tests hold them to.
+"""Key figures of all runs, and the expected key figures that the tests compare them with.
 
-``python -m experiments.key_figures`` writes the expected figures anew, after a change that is meant to move them.
+``python -m experiments.key_figures`` writes new expected figures, after a change that is meant to change them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,11 @@ TOLERANCES = {
 
 
 def key_figures(table: pd.DataFrame) -> dict[str, float]:
-    """The figures of one run, in the order of :data:`TOLERANCES`."""
+    """The key figures of one run, in the order of :data:`TOLERANCES`.
+
+    Args:
+        table: signals of the run, one row per time step.
+    """
     values = (
         table["y"].abs().max(),
         table["v_x"].iloc[-1],
@@ -51,7 +55,11 @@ def key_figures(table: pd.DataFrame) -> dict[str, float]:
 
 
 def of_all_runs(runs: Mapping[Run, pd.DataFrame]) -> dict[str, dict[str, float]]:
-    """Key figures by the run's name."""
+    """Key figures of each run, by the name of the run.
+
+    Args:
+        runs: signals of all runs.
+    """
     return {run.name: key_figures(table) for run, table in runs.items()}
 
 

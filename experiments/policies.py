@@ -1,7 +1,8 @@
-"""Train the policies that ship, compare them on what training left out, and write their model card.
+"""Train the policies that ship, compare them on episodes left out of training, and write their model card.
 
-``python -m experiments.policies`` trains five seeds of a driver and of an allocator, goes on where it was stopped, and
-replaces ``agents/policies``: the policies, their curves, and the card in README.md with the numbers of this run.
+``python -m experiments.policies`` trains five seeds of a driver and of an allocator. An interrupted run resumes. The
+command replaces ``agents/policies``: the policies, their learning curves, and the card in README.md with the numbers
+of this run.
 """
 
 from __future__ import annotations
@@ -19,60 +20,80 @@ import pandas as pd
 import typer
 from jinja2 import Template
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from agents.drivers import POLICIES
 from agents.evaluate import BASELINE, KINDS, LEARNED, METRICS, Row, compare, measure_and_show, shown, where_it_loses
 from agents.tasks import HELD_OUT_DEGRADATIONS, TASKS
 from agents.train import BEST, PROGRESS, Training
-from agents.views import DEAD_ZONE
 from experiments import style
 from shared_control_env.evaluation import SUITES
 from shared_control_env.evaluation.engines import worker_pool
 from shared_control_env.evaluation.interrupt import resumable
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.learned.views import DEAD_ZONE
 from shared_control_env.registration import ENVIRONMENTS
 
 SEEDS = range(5)
 """Training seeds of each task."""
 
 SCENARIOS = SUITES["full"].scenarios
-"""Those that are drawn; the policies are compared in them."""
+"""Scenarios with random draws, in which the policies are compared."""
 
 IDS = [id for id, scenario in ENVIRONMENTS.items() if scenario in SCENARIOS]
 IDS += ["SharedControl/LeadBraking-v0", "SharedControl/LaneChange-v0"]
-"""Environments of training: two shares for those in which a driver who is too slow to brake or to speed up collides."""
+"""Environments of training. Two have a double share: there, a driver who brakes or accelerates too slowly collides."""
 
 STEPS = {"driver": 4_900_000, "allocator": 2_900_000}
-"""Steps of each training; whole segments are learned."""
+"""Number of steps of each training; complete segments are learned."""
 
 FOLDER = Path("results/policies")
-"""Of the trainings."""
+"""Folder of the trainings."""
 
 
 def folder_of(task: str, seed: int) -> Path:
-    """Of one training."""
+    """Folder of one training.
+
+    Args:
+        task: key of :data:`agents.tasks.TASKS`.
+        seed: training seed.
+    """
     return FOLDER / f"{task}-{seed}"
 
 
 def state_of(task: str, seed: int) -> dict[str, Any]:
-    """How far one training is; what it reached."""
+    """Progress and results of one training.
+
+    Args:
+        task: key of :data:`agents.tasks.TASKS`.
+        seed: training seed.
+    """
     path = folder_of(task, seed) / PROGRESS
     return json.loads(path.read_text()) if path.is_file() else {"steps": 0}
 
 
 def train(task: str, seed: int, steps: int) -> None:
-    """Train one policy to the end."""
+    """Train one policy to the end.
+
+    Args:
+        task: key of :data:`agents.tasks.TASKS`.
+        seed: training seed.
+        steps: number of steps [-].
+    """
     training = Training(folder_of(task, seed), "ppo", IDS, task, seed)
     while training.state["steps"] < steps:
         training.run_segment(lambda _: None)
 
 
 def train_all(jobs: int, console: Console) -> None:
-    """Train all policies, several at once."""
+    """Train all policies, several at once.
+
+    Args:
+        jobs: number of trainings at once.
+        console: where the progress is shown.
+    """
     runs = [(task, seed) for task in TASKS for seed in SEEDS]
-    columns = (TextColumn("steps"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar, worker_pool(jobs) as pool:
+    with progress_bar(console) as bar, worker_pool(jobs) as pool:
         progress = bar.add_task("steps", total=sum(STEPS[task] for task, _ in runs))
         waiting = {pool.submit(train, task, seed, STEPS[task]) for task, seed in runs}
         try:
@@ -82,27 +103,38 @@ def train_all(jobs: int, console: Console) -> None:
                     future.result()
                 bar.update(progress, completed=sum(min(state_of(*run)["steps"], STEPS[run[0]]) for run in runs))
         except KeyboardInterrupt:
-            for process in active_children():  # which would go on to the next training
+            for process in active_children():  # otherwise they would begin the next training
                 process.terminate()
             raise
 
 
 def draw_curves(path: Path) -> None:
-    """Validation return of every seed over the steps, a panel a task."""
+    """Draw the validation return of every seed over the steps, one panel per task.
+
+    Args:
+        path: file of the picture.
+    """
     with style.figure(path, 1, len(TASKS), (9.0, 3.2)) as (_, axes):
         for axis, task in zip(axes[0], TASKS, strict=True):
             curves = [np.array(state_of(task, seed)["scores"]).T for seed in SEEDS]
             for seed, (steps, scores) in zip(SEEDS, curves, strict=True):
                 axis.plot(steps / 1e6, scores, label=f"seed {seed}")
             later = np.concatenate([scores[1:] for _, scores in curves])
-            if later.size:  # the first segments are far below, and would leave nothing to be seen of the others
+            if later.size:  # the low first scores would hide the differences between the later ones
                 axis.set_ylim(later.min() - 0.1 * np.ptp(later) - 0.1, later.max() + 0.1 * np.ptp(later) + 0.1)
             axis.set(title=task, xlabel="steps [million]", ylabel="mean return, validation episodes")
         axes[0, 0].legend()
 
 
 def as_markdown(rows: list[Row]) -> list[str]:
-    """The comparison."""
+    """The comparison as a Markdown table.
+
+    Args:
+        rows: result of :func:`agents.evaluate.compare`.
+
+    Returns:
+        Lines of the table.
+    """
     head = ["faults", "name", *(name.replace("_", " ") for name in METRICS)]
     lines = [head, ["---"] * len(head)]
     lines += [[row.kind, row.name, *(shown(value) for value in row.values.values())] for row in rows]
@@ -110,7 +142,12 @@ def as_markdown(rows: list[Row]) -> list[str]:
 
 
 def verdict(rows: list[Row], task: str) -> list[str]:
-    """What the differences from the baseline say, metric by metric, in words."""
+    """The differences from the baseline in words, for every metric.
+
+    Args:
+        rows: result of :func:`agents.evaluate.compare`.
+        task: key of :data:`agents.tasks.TASKS`.
+    """
     lines = []
     for kind in KINDS:
         (differences,) = [
@@ -126,7 +163,12 @@ def verdict(rows: list[Row], task: str) -> list[str]:
 
 
 def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
-    """What the card says of one task."""
+    """Values of the model card for one task.
+
+    Args:
+        task: key of :data:`agents.tasks.TASKS`.
+        table: result of :func:`agents.evaluate.measure`.
+    """
     states = [state_of(task, seed) for seed in SEEDS]
     seconds = [state["seconds"] for state in states]
     rows = compare(table, task)
@@ -152,7 +194,12 @@ def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
 
 
 def card(tables: dict[str, pd.DataFrame], jobs: int) -> str:
-    """The model card."""
+    """The model card in Markdown.
+
+    Args:
+        tables: result of :func:`agents.evaluate.measure` for each task.
+        jobs: number of trainings at once.
+    """
     template = Template(Path(__file__).with_suffix(".md.j2").read_text(), keep_trailing_newline=True)
     versions = state_of("driver", 0)["card"]["versions"]
     return template.render(
@@ -169,7 +216,13 @@ def card(tables: dict[str, pd.DataFrame], jobs: int) -> str:
 
 
 def publish(seeds: int, jobs: int, console: Console) -> None:
-    """Compare the trained policies, and replace those that ship with their card."""
+    """Compare the trained policies, and replace the policies that ship and their card.
+
+    Args:
+        seeds: number of held-out seeds of the comparison.
+        jobs: number of processes.
+        console: where the progress is shown.
+    """
     tables = {}
     for task in TASKS:
         sources = [str(folder_of(task, seed) / BEST) for seed in SEEDS]

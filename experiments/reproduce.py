@@ -1,4 +1,4 @@
-"""Reproduce the paper's results: all runs, figures, videos and claims, from one command."""
+"""Reproduce the paper's results: all runs, figures, videos and claims, with one command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from typing import Annotated, Any
 import pandas as pd
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from experiments import (
@@ -29,15 +28,16 @@ from experiments import (
 )
 from experiments.case_runs import SCENARIOS, SEED, Run, all_runs, simulate
 from shared_control_env.evaluation.interrupt import resumable
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
 
 ROOT = Path(__file__).parent.parent
 STAMP = "fingerprint.txt"
-"""File that says which version of the sources the results in a folder come from."""
+"""File that identifies the version of the sources from which the results in a folder come."""
 
 
 def fingerprint() -> str:
-    """Digest of the package's and the experiments' sources and of the versions that enter the results."""
+    """Digest of the sources of the package and the experiments, and of the versions that affect the results."""
     digest = sha256(repr(sorted(provenance().items())).encode())
     for folder in ("shared_control_env", "experiments"):
         for path in sorted((ROOT / folder).rglob("*.py")):
@@ -46,16 +46,20 @@ def fingerprint() -> str:
 
 
 def provenance() -> dict[str, Any]:
-    """Versions and seed behind the results."""
+    """Versions and seed of the results."""
     packages = ("shared_control_env", "highway-env", "gymnasium", "numpy", "numba", "osqp", "shapely", "scipy")
     return {"seed": SEED, "python": platform.python_version(), **{name: version(name) for name in packages}}
 
 
 def prepare(out: Path, fresh: bool) -> None:
-    """Make the folder ready: new, resumed, or replaced where that was asked for.
+    """Prepare the folder: create it, resume in it, or replace it if requested.
+
+    Args:
+        out: folder of the results.
+        fresh: whether results of other sources or versions are replaced.
 
     Raises:
-        typer.BadParameter: if it holds something else.
+        typer.BadParameter: if the folder holds other files, or results that must not be replaced.
     """
     stamp = out / STAMP
     if out.exists() and any(out.iterdir()):
@@ -72,7 +76,12 @@ def prepare(out: Path, fresh: bool) -> None:
 
 
 def load_or_simulate(run: Run, folder: Path) -> pd.DataFrame:
-    """Signals of a run, from its file where an earlier start has finished it."""
+    """Signals of a run, read from its file if an earlier start has already finished it.
+
+    Args:
+        run: the run.
+        folder: folder of the files.
+    """
     path = folder / f"{run.name}.parquet"
     if not path.is_file():
         table = simulate(run)
@@ -81,7 +90,12 @@ def load_or_simulate(run: Run, folder: Path) -> pd.DataFrame:
 
 
 def figures(runs: dict[Run, pd.DataFrame], out: Path) -> dict[Path, Callable[[Path], None]]:
-    """Every picture and what draws it."""
+    """File of every picture, and the function that draws it.
+
+    Args:
+        runs: signals of all runs.
+        out: folder of the results.
+    """
     drawings: dict[Path, Callable[[Path], None]] = {
         out / "memberships.png": figure_memberships.draw,
         out / "authority_surface.png": figure_authority_surface.draw,
@@ -94,7 +108,11 @@ def figures(runs: dict[Run, pd.DataFrame], out: Path) -> dict[Path, Callable[[Pa
 
 
 def all_signals(runs: dict[Run, pd.DataFrame]) -> pd.DataFrame:
-    """Signals of all runs in one table."""
+    """Signals of all runs in one table.
+
+    Args:
+        runs: signals of all runs.
+    """
     tables = [
         table.assign(case=run.case, law=run.law, preset=run.preset, driver=run.driver) for run, table in runs.items()
     ]
@@ -111,8 +129,7 @@ def main(
     """
     console = Console()
     prepare(out, fresh)
-    columns = (TextColumn("{task.description:<34}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with resumable(out), Progress(*columns, console=console) as progress:
+    with resumable(out), progress_bar(console) as progress:
         planned = all_runs()
         task = progress.add_task("closed-loop runs", total=len(planned))
         runs = {}

@@ -1,4 +1,4 @@
-"""How both cases of the paper depend on what the paper leaves open, and on the driver.
+"""Sensitivity of both cases of the paper to parameters that the paper does not give, and to the driver.
 
 ``python -m experiments.sensitivity`` varies one parameter at a time and writes a table and a picture.
 """
@@ -29,39 +29,53 @@ from shared_control_env.evaluation.storage import write_atomically
 
 LAWS = ("paper", "proportional")
 SHOWN = {"two_lane": "lateral_max", "curve": "min_gap"}
-"""Metric of each case's picture; the table has all."""
+"""Metric in each case's picture; the table has all metrics."""
 
 METRICS = ("lateral_max", "min_gap", "authority_min", "driver_effort", "conflict")
 """Metrics of the table."""
 
 
 class WarpedFuzzyAuthority:
-    """The fuzzy inference with the inner breakpoints of its inputs moved from (1/4, 1/2, 3/4) to their powers 1/g.
+    """The fuzzy inference with moved breakpoints of the membership functions of its inputs.
+
+    The inner breakpoints move from (1/4, 1/2, 3/4) to these values to the power of 1/g.
 
     Args:
-        exponent: g; above 1 the same risk counts as smaller.
+        exponent: g; above 1 the same risk counts as smaller [-].
+
+    Attributes:
+        exponent: g [-].
     """
 
     def __init__(self, exponent: float) -> None:
         self.exponent = exponent
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered."""
+        """Do nothing; the allocator has no state.
+
+        Args:
+            seed: not used.
+        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step."""
+        """alpha_a of one step.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`; not used.
+            signals: record of :data:`core.records.SIGNALS`; the risks ``r_x`` and ``r_y`` are used.
+        """
         r_x, r_y = (float(signals[name]) ** self.exponent for name in ("r_x", "r_y"))
         return fuzzy.authority(r_x, r_y, 0)
 
 
 class Variation(NamedTuple):
-    """One parameter moved.
+    """One changed parameter.
 
     Attributes:
-        parameter: what is varied, with the factor or value.
-        value: factor, or value.
+        parameter: name of the parameter, and whether ``value`` is a factor or a value.
+        value: the factor or the value.
         config: changes to the settings.
-        exponent: of the risks, where the breakpoints are moved.
+        exponent: exponent of the risks, for a change of the membership breakpoints [-].
     """
 
     parameter: str
@@ -71,7 +85,7 @@ class Variation(NamedTuple):
 
 
 def variations() -> list[Variation]:
-    """The base, and every parameter below and above it."""
+    """The base setting, and every parameter below and above its base value."""
     vehicle, weights, lag = VehicleParameters(), PredictiveParameters(), DriverLagParameters()
     found = [Variation("as published", 1.0, {})]
     for factor in (0.85, 1.2, 1.5):
@@ -93,7 +107,14 @@ def variations() -> list[Variation]:
 
 
 def measure(variation: Variation) -> pd.DataFrame:
-    """Both cases under both laws, one row each."""
+    """Run both cases under both laws.
+
+    Args:
+        variation: the changed parameter.
+
+    Returns:
+        One row for each case and law.
+    """
     authorities = {law: AuthorityEntry(law, law, partial(WarpedFuzzyAuthority, variation.exponent)) for law in LAWS}
     table = evaluate("mpc", authorities, "paper", config=variation.config)
     return table.assign(parameter=variation.parameter, value=variation.value)[
@@ -102,7 +123,12 @@ def measure(variation: Variation) -> pd.DataFrame:
 
 
 def draw(table: pd.DataFrame, path: Path) -> None:
-    """Range of each case's metric over every parameter, about the published setting."""
+    """Draw the range of each case's metric over every parameter, around the published setting.
+
+    Args:
+        table: results of :func:`measure` for all variations.
+        path: file of the picture.
+    """
     with style.figure(path, 2, 2, (12.0, 9.0)) as (fig, axes):
         for column, law in enumerate(LAWS):
             for axis, (case, metric) in zip(axes[:, column], SHOWN.items(), strict=True):
@@ -118,7 +144,16 @@ def draw(table: pd.DataFrame, path: Path) -> None:
 
 
 def deviations(table: pd.DataFrame, case: str, law: str) -> tuple[float, pd.DataFrame]:
-    """A case's metric as published, and its lowest and highest value over the variations of every parameter."""
+    """The published value of a case's metric, and its lowest and highest value over the variations of every parameter.
+
+    Args:
+        table: results of :func:`measure` for all variations.
+        case: key of :data:`SHOWN`.
+        law: one of :data:`LAWS`.
+
+    Returns:
+        The published value, and a table with the columns ``low`` and ``high``.
+    """
     part = table[(table["authority"] == law) & (table["scenario"] == case)].round({SHOWN[case]: 6})
     published = part["parameter"] == "as published"
     base = float(part.loc[published, SHOWN[case]].iloc[0])
@@ -127,7 +162,11 @@ def deviations(table: pd.DataFrame, case: str, law: str) -> tuple[float, pd.Data
 
 
 def as_markdown(table: pd.DataFrame) -> str:
-    """The table in Markdown."""
+    """The table in Markdown.
+
+    Args:
+        table: results of :func:`measure` for all variations.
+    """
     head = "| " + " | ".join(table.columns) + " |\n|" + " --- |" * len(table.columns) + "\n"
     rows = [
         "| " + " | ".join(f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in row) + " |"

@@ -1,4 +1,4 @@
-"""Look of the figures."""
+"""Style of the figures."""
 
 from __future__ import annotations
 
@@ -25,18 +25,32 @@ SAFE_AREA, PREDICTION = "#8fd19e", "#00c81e"
 
 @contextmanager
 def figure(path: Path, rows: int, columns: int, size: tuple[float, float]) -> Iterator[tuple]:
-    """A figure with its axes, written to the path at the end."""
+    """A figure with its axes, which is written to a file at the end.
+
+    Args:
+        path: file of the picture.
+        rows, columns: number of panels.
+        size: width and height [inch].
+
+    Yields:
+        The figure and its axes, shape (rows, columns).
+    """
     with plt.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False}):
         fig, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
         try:
             yield fig, axes
             path.parent.mkdir(parents=True, exist_ok=True)
-            # No creation date: the same run writes the same bytes.
+            # Without this metadata the same run writes the same bytes.
             fig.savefig(path, dpi=150, metadata={"Software": None})
         finally:
             plt.close(fig)
 
 
 def mark_fault(axis: plt.Axes, onset: float) -> None:
-    """A dotted line at the onset of the degradation."""
+    """Draw a dotted line at the onset of the degradation.
+
+    Args:
+        axis: axis over time.
+        onset: time of the onset [s].
+    """
     axis.axvline(onset, color="0.4", ls=":", lw=1)

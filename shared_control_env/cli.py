@@ -13,14 +13,6 @@ try:
     import typer
     from rich.console import Console
     from rich.markup import escape
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
     from rich.table import Table
 except ImportError:
     sys.exit('shared-control needs the extra "benchmark": pip install "shared_control_env[benchmark]"')
@@ -70,7 +62,7 @@ def _seeds(text: str) -> list[int]:
     for part in text.split(","):
         low, dash, high = part.strip().partition("-")
         if not low.isdecimal() or (dash and not high.isdecimal()):
-            raise typer.BadParameter(f"seeds = {text!r} must be non-negative numbers or ranges, such as 0-9 or 1,2,5")
+            raise typer.BadParameter(f"seeds = {text!r} must be non-negative numbers and ranges, such as 0-9 or 1,2,5")
         first, last = int(low), int(high or low)
         if first > last or last >= 2**63 or last - first >= MOST_SEEDS:
             raise typer.BadParameter(
@@ -111,12 +103,12 @@ def benchmark(
     fresh: Annotated[bool, typer.Option(help="Replace results of another benchmark in that folder.")] = False,
 ) -> None:
     """Run a suite with drivers under authorities; stopped at any moment, it goes on where it was."""
+    from shared_control_env.evaluation.progress import progress_bar
     from shared_control_env.evaluation.runner import evaluate
 
     console = Console()
-    columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     out = out.expanduser()
-    with _in_words(console), resumable(out), Progress(*columns, console=console) as bar:
+    with _in_words(console), resumable(out), progress_bar(console) as bar:
         task = bar.add_task("episodes", total=None)
         try:
             table = evaluate(

@@ -1,4 +1,4 @@
-"""The nearest valid name, for the messages about names that are not valid."""
+"""The nearest valid name, for error messages about invalid names."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from collections.abc import Iterable
 
 
 def nearest(name: object, valid: Iterable[object]) -> str | None:
-    """The valid name that a misspelt one most probably means; None where none is near.
+    """The valid name that a misspelt name most probably means; None if no name is near.
 
-    Three quarters of the letters must agree (:meth:`difflib.SequenceMatcher.ratio`), or all but one in a short word, or
-    the same letters stand in another order. Case, spaces, hyphens and underscores do not count.
+    A name is near if three quarters of the letters agree (:meth:`difflib.SequenceMatcher.ratio`), if all letters but
+    one agree in a short word, or if the same letters stand in another order. Case, spaces, hyphens and underscores do
+    not count.
 
     Args:
-        name: as it was given.
-        valid: the names that there are.
+        name: the name as given.
+        valid: the valid names.
     """
     spellings = {_plain(each): str(each) for each in valid}
     text = _plain(name)
@@ -25,14 +26,19 @@ def nearest(name: object, valid: Iterable[object]) -> str | None:
 
 
 def hint(name: object, valid: Iterable[object]) -> str:
-    """Half a sentence for a message: the nearest name where there is one, else all of them."""
+    """Half a sentence for an error message: the nearest name if there is one, otherwise all valid names.
+
+    Args:
+        name: the name as given.
+        valid: the valid names.
+    """
     names = [str(each) for each in valid]
     near = nearest(name, names)
     return f"did you mean {near!r}?" if near else f"valid are {', '.join(sorted(names))}" if names else "there is none"
 
 
 def _is_slip(text: str, other: str) -> bool:
-    """Whether words of one length differ in one letter, or in the order of their letters."""
+    """Whether two words of equal length differ in one letter, or only in the order of their letters."""
     return sum(a != b for a, b in zip(text, other, strict=True)) == 1 or sorted(text) == sorted(other)
 
 

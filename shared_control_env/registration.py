@@ -11,7 +11,7 @@ ENVIRONMENTS = {scenario.id: name for name, scenario in SCENARIOS.items()}
 
 
 def register_environments() -> None:
-    """Register every id that is not registered yet."""
+    """Register every id that is not yet registered."""
     for id, name in ENVIRONMENTS.items():
         if id not in gym.registry:
             register(name)

@@ -1,4 +1,4 @@
-"""Controllers with state: the automation and the driver, each thin around the core."""
+"""Controllers with state: the automation and the driver. Each is a thin layer around the compiled core."""
 
 from shared_control_env.controllers.automation import Automation
 from shared_control_env.controllers.driver import Driver, PredictiveDriver

@@ -1,4 +1,4 @@
-"""Allocators of the automation's authority alpha_a: the interface that any has, and those to compare with."""
+"""Allocators of the automation's authority alpha_a: the common interface, and allocators for comparison."""
 
 from __future__ import annotations
 
@@ -18,45 +18,49 @@ from shared_control_env.nearest import hint
 class Allocator(Protocol):
     """Anything that decides how much authority the automation has.
 
-    One that the kernel runs too has an attribute ``compiled``: a function of scene, signals and parameters that numba
-    compiles (:data:`core.authority.allocators.ALLOCATE`), and that gives what ``allocate`` gives.
+    An allocator that the kernel also runs has an attribute ``compiled``. It is a function of scene, signals and
+    parameters that numba compiles (:data:`core.authority.allocators.ALLOCATE`), and it returns the same value as
+    ``allocate``.
     """
 
     def reset(self, seed: int | None = None) -> None:
         """Begin an episode.
 
         Args:
-            seed: for allocators that draw random numbers.
+            seed: seed for allocators that draw random numbers.
         """
         ...
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """Decide on alpha_a of one step.
+        """Decide on alpha_a for one step.
 
         Args:
             scene: what the sensors give, a record of :data:`core.records.SCENE`.
-            signals: of the same step, a record of :data:`core.records.SIGNALS`: the automation's degraded command
-                ``u_a_f``, where it would lead (``prediction_road``), and its risks ``r_x`` and ``r_y``.
+            signals: signals of the same step, a record of :data:`core.records.SIGNALS`: the automation's degraded
+                command ``u_a_f``, the predicted position under that command (``prediction_road``), and its risks
+                ``r_x`` and ``r_y``.
 
         Returns:
-            alpha_a, finite; clipped to [0, 1] by the caller.
+            alpha_a, finite; the caller clips it to [0, 1].
         """
         ...
 
 
 def checked_authority(alpha_a: Any, who: str = "allocator") -> float:
-    """What an allocator's ``allocate`` gave as a number; an array of one number is one, as a policy's prediction.
+    """Check the value that an allocator's ``allocate`` returned, and convert it to a float.
+
+    An array with one number is accepted, such as a policy's prediction.
 
     Args:
-        alpha_a: the authority.
-        who: for the message.
+        alpha_a: the authority [-].
+        who: name of the allocator for the error message.
 
     Raises:
-        ValueError: if it is not one finite number.
+        ValueError: if the value is not one finite number.
     """
     array = as_numbers(alpha_a)
     if array.size != 1 or not np.isfinite(array).all():
-        raise ValueError(f"{who}: allocate() gave {alpha_a!r}; it must give one finite number alpha_a in [0, 1]")
+        raise ValueError(f"{who}: allocate() gave {alpha_a!r}; it must return one finite number alpha_a in [0, 1]")
     return array.item()
 
 
@@ -64,10 +68,11 @@ class FuzzyAuthority:
     """The paper's fuzzy inference, ``alpha_a = FIS(r_x, r_y)`` (Eq. 9).
 
     Args:
-        operators: of :data:`core.authority.fuzzy.OPERATORS`.
+        operators: name of the fuzzy operators, one of :data:`core.authority.fuzzy.OPERATORS`.
 
     Attributes:
-        compiled: for the kernel.
+        operators: name of the fuzzy operators.
+        compiled: the allocator for the kernel.
     """
 
     def __init__(self, operators: str = "product-sum") -> None:
@@ -77,15 +82,24 @@ class FuzzyAuthority:
         self.compiled = compiled_allocators.FUZZY[operators]
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered."""
+        """Do nothing; the allocator has no state.
+
+        Args:
+            seed: not used.
+        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step."""
+        """alpha_a of one step.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`; not used.
+            signals: record of :data:`core.records.SIGNALS`; the risks ``r_x`` and ``r_y`` are used.
+        """
         return authority(float(signals["r_x"]), float(signals["r_y"]), OPERATORS.index(self.operators))
 
 
 class FixedAuthority:
-    """The same authority always.
+    """A constant authority.
 
     Args:
         alpha: the authority [-].
@@ -95,55 +109,87 @@ class FixedAuthority:
         self.alpha = alpha
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered."""
+        """Do nothing; the allocator has no state.
+
+        Args:
+            seed: not used.
+        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """The authority."""
+        """The constant authority.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`; not used.
+            signals: record of :data:`core.records.SIGNALS`; not used.
+        """
         return self.alpha
 
 
 def _risk(signals: np.ndarray) -> float:
-    """The larger of both risks."""
+    """The larger of the two risks."""
     return max(float(signals["r_x"]), float(signals["r_y"]))
 
 
 class LinearAuthority:
-    """``alpha_a = 1 - max(r_x, r_y)``."""
+    """Authority that falls linearly with the larger risk, ``alpha_a = 1 - max(r_x, r_y)``."""
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered."""
+        """Do nothing; the allocator has no state.
+
+        Args:
+            seed: not used.
+        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step."""
+        """alpha_a of one step.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`; not used.
+            signals: record of :data:`core.records.SIGNALS`; the risks ``r_x`` and ``r_y`` are used.
+        """
         return 1.0 - _risk(signals)
 
 
 class SoftmaxAuthority:
-    """Softmax of the automation's risk r against an accepted one: ``alpha_a = e^(-r/T) / (e^(-r/T) + e^(-r_0/T))``.
+    """Softmax of the automation's risk r against an accepted risk r_0.
+
+    ``alpha_a = e^(-r/T) / (e^(-r/T) + e^(-r_0/T))`` with ``r = max(r_x, r_y)``.
 
     Args:
-        accepted: r_0, the risk at which both have equal authority [-].
-        temperature: T, how sharp the choice is [-].
+        accepted: r_0, the risk at which automation and driver have equal authority [-].
+        temperature: T; the smaller T is, the sharper the transition [-].
     """
 
     def __init__(self, accepted: float = 0.5, temperature: float = 0.1) -> None:
         self.accepted, self.temperature = accepted, temperature
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered."""
+        """Do nothing; the allocator has no state.
+
+        Args:
+            seed: not used.
+        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step."""
+        """alpha_a of one step.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`; not used.
+            signals: record of :data:`core.records.SIGNALS`; the risks ``r_x`` and ``r_y`` are used.
+        """
         return 1.0 / (1.0 + exp((_risk(signals) - self.accepted) / self.temperature))
 
 
 class HardTakeover:
-    """All or nothing with hysteresis: the driver has it from a high risk on, until it has been low for a while.
+    """All or nothing with hysteresis.
+
+    The driver takes over when the risk exceeds ``high``. The automation is back in charge after the risk has stayed
+    below ``low`` for ``hold`` seconds.
 
     Args:
-        high: risk that takes the authority away [-].
-        low: risk that may give it back [-].
-        hold: how long it has to be lower [s].
+        high: risk above which the automation loses its authority [-].
+        low: risk below which the automation may regain it [-].
+        hold: time for which the risk must stay below ``low`` [s].
     """
 
     def __init__(self, high: float = 0.6, low: float = 0.2, hold: float = 1.0) -> None:
@@ -151,11 +197,20 @@ class HardTakeover:
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin an episode with the automation in charge."""
+        """Begin an episode with the automation in charge.
+
+        Args:
+            seed: not used.
+        """
         self._taken, self._quiet_since = False, inf
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step, 0 or 1."""
+        """alpha_a of one step, 0 or 1.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`; the time ``t`` is used.
+            signals: record of :data:`core.records.SIGNALS`; the risks ``r_x`` and ``r_y`` are used.
+        """
         risk, t = _risk(signals), float(scene["t"])
         if risk > self.high:
             self._taken = True
@@ -169,38 +224,57 @@ class HardTakeover:
 
 
 class TimeBasedAuthority:
-    """Authority by the time that is left: to the vehicle ahead, and to the edge of the lane.
+    """Authority from the time to the vehicle ahead and to the edge of the lane.
 
-    ``alpha_a = (T - T_low) / (T_high - T_low)`` in [0, 1] with T the smaller of the time to collision and the time to
-    lane crossing (Godthelp et al., The Development of a Time Based Approach..., Human Factors 1984). The rates
-    are those that the degraded command leads to within the prediction's horizon.
+    ``alpha_a = (T - T_low) / (T_high - T_low)``, clipped to [0, 1]. T is the smaller of the time to collision and the
+    time to lane crossing (Godthelp et al., The Development of a Time Based Approach..., Human Factors 1984). Both use
+    the rates that the degraded command leads to within the prediction horizon.
 
     Args:
-        low: T at which the driver is alone [s].
-        high: T from which on the automation has all [s].
-        horizon: of the prediction, ``task.tau_p`` [s].
-        lane_width: [m].
+        low: T_low, at or below which the driver has all the authority [s].
+        high: T_high, at or above which the automation has all the authority [s].
+        horizon: prediction horizon, ``task.tau_p`` [s].
+        lane_width: width of the lane [m].
     """
 
     def __init__(self, low: float = 0.5, high: float = 2.0, horizon: float = 0.5, lane_width: float = 4.0) -> None:
         self.low, self.high, self.horizon, self.lane_width = low, high, horizon, lane_width
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered."""
+        """Do nothing; the allocator has no state.
+
+        Args:
+            seed: not used.
+        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step."""
+        """alpha_a of one step.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`.
+            signals: record of :data:`core.records.SIGNALS`.
+        """
         left = min(self.time_to_collision(scene, signals), self.time_to_lane_crossing(scene, signals))
         return min(max((left - self.low) / (self.high - self.low), 0.0), 1.0)
 
     def time_to_collision(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """Time to collision with the vehicle ahead at the predicted speed [s]; infinite unless closing."""
+        """Time to collision with the vehicle ahead at the predicted speed [s]; infinite unless the gap closes.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`.
+            signals: record of :data:`core.records.SIGNALS`; the predicted speed is used.
+        """
         gap, v_lead = lead_of(scene)
         closing = float(signals["prediction"][3]) - v_lead
         return max(gap, 0.0) / closing if closing > 0.0 else inf
 
     def time_to_lane_crossing(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """Time until the centre is on the lane's edge at the predicted lateral speed [s]."""
+        """Time until the vehicle's centre reaches the edge of the lane at the predicted lateral speed [s].
+
+        Args:
+            scene: record of :data:`core.records.SCENE`.
+            signals: record of :data:`core.records.SIGNALS`; the predicted lateral position is used.
+        """
         offset = float(scene["z"][1] - scene["y_target"])
         rate = (float(signals["prediction_road"][1]) - float(scene["z"][1])) / self.horizon
         if rate == 0.0:

@@ -1,4 +1,4 @@
-"""Numbers that users' code gives, as arrays of NumPy."""
+"""Conversion of numbers that user code returns to NumPy arrays."""
 
 from __future__ import annotations
 
@@ -8,12 +8,22 @@ import numpy as np
 
 
 def as_array(value: Any) -> Any:
-    """A tensor of PyTorch as an array of NumPy, which NumPy by itself warns of; anything else as it is."""
+    """Convert a PyTorch tensor to a NumPy array; return any other value unchanged.
+
+    NumPy's own conversion of a tensor would give a warning.
+
+    Args:
+        value: any value.
+    """
     return value.detach().cpu().numpy() if hasattr(value, "detach") else value
 
 
 def as_numbers(value: Any) -> np.ndarray:
-    """Numbers as an array of floats; an empty one where they are none."""
+    """Convert numbers to an array of floats; the array is empty if the value is not numeric.
+
+    Args:
+        value: any value.
+    """
     try:
         return np.asarray(as_array(value), dtype=float)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""The automation: nonlinear predictive control with a warm start."""
+"""The automation: nonlinear model predictive control with a warm start."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from shared_control_env.core.records import AUTOMATION_MEMORY
 class Planner(Protocol):
     """Anything that decides the automation's desired command.
 
-    It may have an attribute ``failures``: steps since the reset at which it held its last command.
+    A planner may have an attribute ``failures``: the number of steps since the reset at which it held its last command.
     """
 
     def reset(self) -> None:
@@ -26,16 +26,16 @@ class Planner(Protocol):
         ...
 
     def act(self, scene: np.ndarray) -> Solution:
-        """Decide on one scene; ``command`` is u_a,des = [a, delta] [m/s^2, rad].
+        """Decide on the command for one scene; ``command`` is u_a,des = [a, delta] [m/s^2, rad].
 
         Args:
-            scene: record of :data:`records.SCENE` as the automation takes it for, an array of no dimension.
+            scene: the scene as the automation perceives it, a record of :data:`records.SCENE`, 0-d array.
         """
         ...
 
 
 class Automation:
-    """Desired commands u_a,des by the nonlinear predictive controller of Eq. 12-13.
+    """Desired commands u_a,des from the nonlinear predictive controller of Eq. 12-13.
 
     Args:
         parameters: :func:`records.pack` of :class:`Parameters`.
@@ -48,7 +48,7 @@ class Automation:
 
     @property
     def failures(self) -> int:
-        """Steps since the reset at which the solver failed and the last command was held."""
+        """Number of steps since the reset at which the solver failed and the last command was held."""
         return int(self._memory["failures"])
 
     def reset(self) -> None:
@@ -56,13 +56,14 @@ class Automation:
         entries.clear_automation(self._memory)
 
     def act(self, scene: np.ndarray) -> Solution:
-        """Decide on one scene.
+        """Decide on the command for one scene.
 
         Args:
-            scene: record of :data:`records.SCENE`, an array of no dimension; its safe area found.
+            scene: record of :data:`records.SCENE`, 0-d array, with its safe area already found.
 
         Returns:
-            The solution: ``status`` as in :mod:`core.control.automation`, ``dual_residual`` the projected gradient.
+            The solution. ``status`` is as in :mod:`core.control.automation`; ``dual_residual`` is that of the projected
+            gradient.
         """
         begin = perf_counter()
         status, iterations, residual = entries.automate(

@@ -1,4 +1,4 @@
-"""Drivers: the interface that any driver has, and the predictive driver of the paper."""
+"""Drivers: the common interface, and the predictive driver of the paper."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import PERSON_MEMORY, SCENE, pack
 
 KEPT = 1000
-"""Programs that a predictive driver remembers for its copies, 2 kB each; its solver begins anew after as many."""
+"""Number of programs, 2 kB each, that a predictive driver stores for its copies; then its solver is set up again."""
 
 
 @runtime_checkable
 class Driver(Protocol):
-    """Anything that drives: scripted, learned, predictive, or a person at the controls.
+    """Anything that drives: a scripted, learned or predictive driver, or a person at the controls.
 
     A driver that solves a problem may also have an attribute ``solution``, the last
-    :class:`~shared_control_env.controllers.solution.Solution`; it is then reported in ``info``.
+    :class:`~shared_control_env.controllers.solution.Solution`. The environment then reports it in ``info``.
     """
 
     def reset(self, seed: int | None = None) -> None:
         """Begin an episode.
 
         Args:
-            seed: for drivers that draw random numbers.
+            seed: seed for drivers that draw random numbers.
         """
         ...
 
@@ -41,52 +41,53 @@ class Driver(Protocol):
         """Decide on the desired command of one step.
 
         Args:
-            observation: what the environment gives to see, by default
-                :data:`core.feedback.observation.DRIVER_V0`, shape (n,).
-            scene: the same step in SI units, a record of :data:`core.records.SCENE`, such as ``scene["z"]``.
+            observation: the environment's observation, shape (n,); by default
+                :data:`core.feedback.observation.DRIVER_V0`.
+            scene: the same step in SI units, a record of :data:`core.records.SCENE`; ``scene["z"]``, for example.
 
         Returns:
-            ``u_h,des = [a, delta]`` [m/s^2, rad], shape (2,); clipped to the limits by the caller.
+            ``u_h,des = [a, delta]`` [m/s^2, rad], shape (2,); the caller clips it to the limits.
         """
         ...
 
 
 def checked_command(command: Any, who: str = "driver") -> np.ndarray:
-    """What a driver's ``act`` gave as an array.
+    """Check the value that a driver's ``act`` returned, and convert it to an array.
 
     Args:
         command: anything with two numbers, ``[a, delta]`` [m/s^2, rad].
-        who: for the message.
+        who: name of the driver for the error message.
 
     Returns:
-        Shape (2,).
+        Array of shape (2,).
 
     Raises:
-        ValueError: if it is not two finite numbers.
+        ValueError: if the value is not two finite numbers.
     """
     array = as_numbers(command)
     if array.shape != (2,) or not all(map(isfinite, array.tolist())):
-        raise ValueError(f"{who}: act() gave {command!r}; it must give finite [a, delta] [m/s^2, rad], shape (2,)")
+        raise ValueError(f"{who}: act() gave {command!r}; it must return finite [a, delta] [m/s^2, rad], shape (2,)")
     return array
 
 
 class PredictiveDriver:
-    """The driver of Eq. 14-15: the automation's costs without the potential field, linearised, in OSQP.
+    """The driver of Eq. 14-15: the automation's costs without the potential field, linearised, solved by OSQP.
 
-    With ``parameters.internal_model.active`` it knows its own response and feels the automation's command
-    (:mod:`core.control.driver`); the paper's does not.
+    With ``parameters.internal_model.active`` the driver knows its own response and feels the automation's command
+    (:mod:`core.control.driver`). The paper's driver does neither.
 
-    The workspace is set up at every reset, so that episodes do not depend on those before, and updated in
-    place at every step; anew after :data:`KEPT` steps. Where OSQP does not solve to tolerance the last feasible command
-    is held.
+    The OSQP workspace is set up at every reset, so that episodes do not depend on earlier ones. At every step it is
+    updated in place. After :data:`KEPT` steps it is set up again. If OSQP does not solve to tolerance, the last
+    feasible command is held.
 
     Args:
-        parameters: the environment's parameters; defaults to the paper's.
-        eps: OSQP's absolute and relative tolerance.
+        parameters: the environment's parameters; by default those of the paper.
+        eps: OSQP's absolute and relative tolerance [-].
 
     Attributes:
         solution: the last solution; ``status`` is OSQP's code, 1 for solved.
-        failures: steps since the reset at which the last command was held.
+        failures: number of steps since the reset at which the last command was held.
+        P, q, A, low, high: matrices and bounds of the last quadratic program.
     """
 
     def __init__(self, parameters: Parameters | None = None, eps: float = 1e-5) -> None:
@@ -108,7 +109,11 @@ class PredictiveDriver:
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin an episode; the predictive driver draws nothing, so the seed is not used."""
+        """Begin an episode.
+
+        Args:
+            seed: not used, since the predictive driver draws no random numbers.
+        """
         self.failures = 0
         self.solution: Solution | None = None
         self._last, self._arm = np.zeros(2), np.zeros(2)
@@ -116,21 +121,26 @@ class PredictiveDriver:
         self._problems: list[tuple[np.ndarray, ...]] = []
 
     def __getstate__(self) -> dict[str, Any]:
-        """State for copies. OSQP's workspace cannot be copied: a copy solves the same programs again at first."""
+        """State for copies. OSQP's workspace cannot be copied; a copy first solves the same programs again."""
         return {**self.__dict__, "_solver": None}
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired command u_h,des; see :class:`Driver`."""
-        if scene["k"] > 0:  # what the arm gives now, after a step under its last command
+        """Desired command u_h,des of one step; see :class:`Driver`.
+
+        Args:
+            observation: the environment's observation; not used.
+            scene: record of :data:`records.SCENE`, with its safe area already found.
+        """
+        if scene["k"] > 0:  # state of the arm after a step under its last command
             entries.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
         self.solution = self.solve(scene)
         return self.solution.command
 
     def solve(self, scene: np.ndarray) -> Solution:
-        """Condense and solve the program of one scene.
+        """Condense and solve the quadratic program of one scene.
 
         Args:
-            scene: record of :data:`records.SCENE`, its safe area found.
+            scene: record of :data:`records.SCENE`, with its safe area already found.
 
         Returns:
             The solution.
@@ -157,7 +167,7 @@ class PredictiveDriver:
         )
 
     def _solved(self) -> Any:
-        """OSQP's result of the present program, from where it ended with those before."""
+        """OSQP's result for the current program, warm-started from the previous programs."""
         if len(self._problems) == KEPT:
             self._solver = None
             self._problems.clear()
@@ -167,7 +177,7 @@ class PredictiveDriver:
             return self._advance(*self._problems[-1])
         self._solver = self._set_up(*self._problems[0])
         result = self._solver.solve(raise_error=False)
-        for problem in self._problems[1:]:  # of a copy
+        for problem in self._problems[1:]:  # only a copy has more than one here
             result = self._advance(*problem)
         return result
 
@@ -177,7 +187,7 @@ class PredictiveDriver:
         return self._solver.solve(raise_error=False)
 
     def _set_up(self, P: np.ndarray, A: np.ndarray, q: np.ndarray, low: np.ndarray, high: np.ndarray) -> osqp.OSQP:
-        """OSQP workspace with the full pattern; rho adapts by iterations, not by time, so that runs repeat."""
+        """OSQP workspace with the full pattern; rho adapts by iterations, not by time, so that runs can be repeated."""
         self._P_pattern.data, self._A_pattern.data = P, A
         solver = osqp.OSQP()
         solver.setup(
@@ -197,36 +207,47 @@ class PredictiveDriver:
 
 
 class PersonDriver(PredictiveDriver):
-    """The predictive driver behind a person's eyes, attention and arm (:mod:`core.control.person`), as in the kernel.
+    """The predictive driver with a person's perception, attention and arm, as in the kernel.
+
+    See :mod:`core.control.person`.
 
     Args:
-        parameters: the environment's parameters, ``parameters.person.active`` among them.
-        eps: OSQP's absolute and relative tolerance.
+        parameters: the environment's parameters; ``parameters.person.active`` must be True.
+        eps: OSQP's absolute and relative tolerance [-].
 
     Attributes:
-        person: record of :data:`records.PERSON_MEMORY`: whether the person drives, what was noticed and when.
+        person: record of :data:`records.PERSON_MEMORY`: whether the person drives, and what was noticed and when.
 
     Raises:
-        ValueError: if the parameters have no person.
+        ValueError: if ``parameters.person.active`` is False.
     """
 
     def __init__(self, parameters: Parameters, eps: float = 1e-5) -> None:
         if not parameters.person.active:
-            raise ValueError("parameters.person.active = False must be True for a person to drive")
+            raise ValueError("parameters.person.active = False; it must be True for a person to drive")
         self.person = np.zeros((), PERSON_MEMORY)
         self._seen = np.zeros((), SCENE)
         super().__init__(parameters, eps)
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin an episode; what is random in the person comes from ``parameters.person.seed``."""
+        """Begin an episode.
+
+        Args:
+            seed: not used; the person's random numbers come from ``parameters.person.seed``.
+        """
         super().reset(seed)
         self._total = np.zeros(2)
         entries.clear_person(self.person, self._parameters)
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired command u_h,des of the person; see :class:`Driver`."""
+        """Desired command u_h,des of the person; see :class:`Driver`.
+
+        Args:
+            observation: the environment's observation; not used.
+            scene: record of :data:`records.SCENE`, with its safe area already found.
+        """
         if scene["k"] > 0:
-            self._total = np.clip(scene["felt"] + self._arm, -self._bounds, self._bounds)  # that drove the last step
+            self._total = np.clip(scene["felt"] + self._arm, -self._bounds, self._bounds)  # command of the last step
             entries.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
         self._seen[()] = scene
         if entries.take_in(scene, self._total, self.person, self._parameters, self._seen):
@@ -240,5 +261,9 @@ class PersonDriver(PredictiveDriver):
 
 
 def driver_of(parameters: Parameters) -> PredictiveDriver:
-    """The driver that an environment's parameters describe: a person, or the predictive driver by itself."""
+    """The driver that an environment's parameters describe: a person, or the predictive driver alone.
+
+    Args:
+        parameters: the environment's parameters.
+    """
     return PersonDriver(parameters) if parameters.person.active else PredictiveDriver(parameters)

@@ -1,4 +1,4 @@
-"""The vehicle ahead, as drivers and allocators look at it."""
+"""The vehicle ahead, as used by drivers and allocators."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESE
 
 
 def lead_of(scene: np.ndarray) -> tuple[float, float]:
-    """Gap to the vehicle ahead in the lane, bumper to bumper [m], and its speed [m/s]; infinite and 0 without one.
+    """Bumper-to-bumper gap to the vehicle ahead in the lane [m], and its speed [m/s].
 
     Args:
         scene: record of :data:`core.records.SCENE`.
+
+    Returns:
+        Gap and speed; infinity and 0 if there is no vehicle ahead.
     """
     near = scene["neighbours"][PRECEDING].tolist()
     if not near[PRESENT]:

@@ -1,4 +1,4 @@
-"""Drivers that follow rules, and the ways in which people fall short of them."""
+"""Drivers that follow rules, and drivers that deviate from these rules as people do."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from shared_control_env.core.world.traffic import idm_acceleration
 
 
 class ScriptedDriver:
-    """Steers by Stanley's law and keeps speed and distance by the Intelligent Driver Model.
+    """Steers by Stanley's law, and keeps speed and distance by the Intelligent Driver Model.
 
-    ``delta = L kappa - psi - atan(k y / (v + v_0))`` at the centre of mass, with the road's curvature fed forward
-    (Hoffmann et al., Autonomous Automobile Trajectory Tracking for Off-Road Driving, ACC 2007); the acceleration is
-    :func:`core.world.traffic.idm_acceleration` towards the target speed, which is that of a slower vehicle ahead.
+    ``delta = L kappa - psi - atan(k y / (v + v_0))`` at the centre of mass, with the road's curvature as feedforward
+    (Hoffmann et al., Autonomous Automobile Trajectory Tracking for Off-Road Driving, ACC 2007). The acceleration is
+    proportional to the error from the target speed, which is that of a slower vehicle ahead. Behind a vehicle it is at
+    most :func:`core.world.traffic.idm_acceleration`.
 
     Args:
         gain: k, lateral gain [1/s].
-        softening: v_0, keeps the law mild at low speed [m/s].
-        speed_gain: acceleration for each m/s of speed error, at most that of the model's following [1/s].
+        softening: v_0, which limits the gain at low speed [m/s].
+        speed_gain: acceleration per speed error; the car-following model limits the acceleration [1/s].
         wheelbase: L [m].
     """
 
@@ -31,10 +32,19 @@ class ScriptedDriver:
         self.speed_gain, self.wheelbase = speed_gain, wheelbase
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered and nothing drawn."""
+        """Do nothing; the driver has no state and draws no random numbers.
+
+        Args:
+            seed: not used.
+        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired acceleration and steering, shape (2,)."""
+        """Desired acceleration and steering [m/s^2, rad], shape (2,).
+
+        Args:
+            observation: the environment's observation; not used.
+            scene: record of :data:`core.records.SCENE`.
+        """
         _, y, psi, v, _, _ = scene["z"].tolist()
         error = y - float(scene["y_target"])
         steering = self.wheelbase * float(scene["kappa"][0]) - psi - atan2(self.gain * error, v + self.softening)
@@ -46,16 +56,17 @@ class ScriptedDriver:
 
 
 class DistractedDriver:
-    """Lets go until the authority on display has fallen for a while; then attention comes back little by little.
+    """Driver who is distracted until the displayed authority falls, and who then regains attention gradually.
 
-    Hands that rest on the wheel follow it: u_h,des is the automation's command that is felt there. From
-    ``reaction`` seconds after the displayed authority first fell under ``notice`` on, awareness is
-    ``w = 1 - exp(-t / recovery)`` and the command is w times the attentive driver's and 1 - w times the felt one.
+    The hands of a distracted driver rest on the wheel and follow it: u_h,des is the automation's command that is felt
+    there. The displayed authority first falls below ``notice`` at some time. From ``reaction`` seconds after that time
+    on, awareness is ``w = 1 - exp(-t / recovery)``. The command is w times the attentive driver's command plus 1 - w
+    times the felt command.
 
     Args:
-        notice: authority under which the display catches the eye [-].
-        reaction: time until then [s]; take-over times of 1 to 3 s are usual (Eriksson & Stanton, Takeover Time in
-            Highly Automated Vehicles, Human Factors 2017, report 1.9 to 25.7 s).
+        notice: authority below which the display attracts attention [-].
+        reaction: time from there until awareness begins to rise [s]; take-over times of 1 to 3 s are usual (Eriksson &
+            Stanton, Takeover Time in Highly Automated Vehicles, Human Factors 2017, report 1.9 to 25.7 s).
         recovery: time constant of awareness [s].
         dt: time step [s].
     """
@@ -66,11 +77,20 @@ class DistractedDriver:
         self.reset()
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin an episode, distracted."""
+        """Begin an episode with a distracted driver.
+
+        Args:
+            seed: not used.
+        """
         self._since = -inf
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired acceleration and steering, shape (2,)."""
+        """Desired acceleration and steering [m/s^2, rad], shape (2,).
+
+        Args:
+            observation: the environment's observation; not used.
+            scene: record of :data:`core.records.SCENE`; the displayed authority and the felt command are used too.
+        """
         t = float(scene["t"])
         if self._since == -inf and scene["displayed"] < self.notice:
             self._since = t
@@ -80,10 +100,10 @@ class DistractedDriver:
 
 
 class OverreactingDriver:
-    """Does what the scripted driver does, several times as hard.
+    """Driver whose command is a multiple of the scripted driver's command.
 
     Args:
-        excess: factor on its command [-].
+        excess: factor on the scripted driver's command [-].
     """
 
     def __init__(self, excess: float = 2.5) -> None:
@@ -91,20 +111,30 @@ class OverreactingDriver:
         self._calm = ScriptedDriver()
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered and nothing drawn."""
+        """Do nothing; the driver has no state and draws no random numbers.
+
+        Args:
+            seed: not used.
+        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired acceleration and steering, shape (2,)."""
+        """Desired acceleration and steering [m/s^2, rad], shape (2,).
+
+        Args:
+            observation: the environment's observation; not used.
+            scene: record of :data:`core.records.SCENE`.
+        """
         return self.excess * self._calm.act(observation, scene)
 
 
 class FightingDriver:
-    """Pushes against whatever the automation does differently from what this driver wants.
+    """Driver who opposes the automation wherever its command differs from what the driver wants.
 
-    ``u_h,des = u + stubbornness (u - u_felt)`` with the scripted driver's u.
+    ``u_h,des = u + stubbornness (u - u_felt)``, where u is the scripted driver's command and u_felt is the
+    automation's command that the driver feels.
 
     Args:
-        stubbornness: how hard [-].
+        stubbornness: gain of the opposition [-].
     """
 
     def __init__(self, stubbornness: float = 1.0) -> None:
@@ -112,9 +142,18 @@ class FightingDriver:
         self._wish = ScriptedDriver()
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered and nothing drawn."""
+        """Do nothing; the driver has no state and draws no random numbers.
+
+        Args:
+            seed: not used.
+        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired acceleration and steering, shape (2,)."""
+        """Desired acceleration and steering [m/s^2, rad], shape (2,).
+
+        Args:
+            observation: the environment's observation; not used.
+            scene: record of :data:`core.records.SCENE`; the felt command is used too.
+        """
         wish = self._wish.act(observation, scene)
         return wish + self.stubbornness * (wish - scene["felt"])

@@ -1,4 +1,4 @@
-"""What a predictive controller returns."""
+"""Result of a predictive controller."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ class Solution(NamedTuple):
     """Outcome of one solve.
 
     Attributes:
-        command: ``[a, delta]`` [m/s^2, rad], shape (2,); the last feasible one where ``found`` is false.
-        found: whether the solver gave a usable command.
-        status: the solver's own code, see the controller.
-        iterations: iterations done.
-        primal_residual: violation of the constraints; 0 for a method that keeps them.
-        dual_residual: stationarity.
+        command: ``[a, delta]`` [m/s^2, rad], shape (2,); the last feasible command where ``found`` is False.
+        found: whether the solver found a usable command.
+        status: the solver's own status code; see the controller.
+        iterations: number of iterations.
+        primal_residual: violation of the constraints; 0 for a method whose iterates stay feasible.
+        dual_residual: residual of the stationarity condition.
         time: wall time [s]. It differs from run to run, so it never enters ``info``.
     """
 

@@ -1,1 +1,1 @@
-"""The model, compiled by numba: array functions that know neither Gymnasium nor highway-env."""
+"""The model, compiled by numba: functions of arrays that do not depend on Gymnasium or highway-env."""

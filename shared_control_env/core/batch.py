@@ -1,4 +1,4 @@
-"""The arrays of many environments, and the view of one of them that the loop works on."""
+"""The arrays that hold many environments, and the view of one environment that the loop works on."""
 
 from __future__ import annotations
 
@@ -23,23 +23,24 @@ from shared_control_env.core.risk.finding import Finding
 
 
 class Batch(NamedTuple):
-    """State of N environments, one entry each.
+    """State of N environments, one entry per environment.
 
     Attributes:
-        parameters: records of :class:`core.parameters.Parameters`, (N,).
-        scenes: of :data:`records.SCENE`, (N,).
-        signals: of :data:`records.SIGNALS`, (N,).
-        memories: of :data:`records.MEMORY`, (N,).
-        automations: of :data:`records.AUTOMATION_MEMORY`, (N,).
-        persons: of :data:`records.PERSON_MEMORY`, (N,); one, which nobody uses, where the kernel has no driver.
-        transitions: of :data:`records.TRANSITION`, (N,).
-        states: ego ``[x, y, psi, v_x, v_y, r]``, (N, 6).
-        lines: reference lines of the roads, (N, n, 6).
-        faults: records of :class:`core.parameters.DegradationParameters`, (N, m).
-        fault_memories: of :data:`records.FAULT_MEMORY`, (N, m).
-        traffic: other vehicles, (N, M, 8).
-        plans: what they are going to do, records of :class:`core.parameters.TrafficParameters`, (N, M).
-        ended: whether the episode has ended and awaits its reset, (N,).
+        parameters: records of :class:`core.parameters.Parameters`, shape (N,).
+        scenes: records of :data:`records.SCENE`, shape (N,).
+        signals: records of :data:`records.SIGNALS`, shape (N,).
+        memories: records of :data:`records.MEMORY`, shape (N,).
+        automations: records of :data:`records.AUTOMATION_MEMORY`, shape (N,).
+        persons: records of :data:`records.PERSON_MEMORY`, shape (N,); a single unused record, shape (1,), where the
+            kernel has no driver.
+        transitions: records of :data:`records.TRANSITION`, shape (N,).
+        states: ego ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (N, 6).
+        lines: reference lines of the roads, see :mod:`core.world.road`, shape (N, n, 6).
+        faults: records of :class:`core.parameters.DegradationParameters`, shape (N, m).
+        fault_memories: records of :data:`records.FAULT_MEMORY`, shape (N, m).
+        traffic: other vehicles, columns as in :mod:`core.records`, shape (N, M, 8).
+        plans: plans of the other vehicles, records of :class:`core.parameters.TrafficParameters`, shape (N, M).
+        ended: whether the episode has ended and the environment awaits its reset, shape (N,).
     """
 
     parameters: np.ndarray
@@ -59,22 +60,22 @@ class Batch(NamedTuple):
 
 
 class Environment(NamedTuple):
-    """One environment of a batch.
+    """One environment of a batch, as views of its entries.
 
     Attributes:
         p: parameters.
-        scene: what is perceived at the present time step.
-        signals: of that step.
+        scene: the scene perceived at the present time step.
+        signals: signals of that time step.
         memory: what the loop carries from step to step.
-        automation: what the automation carries.
-        person: what a person at the wheel carries.
-        transition: what the last step led from and to.
-        state: ego ``[x, y, psi, v_x, v_y, r]``, (6,).
-        line: reference line of the road, (n, 6).
-        faults: records of :class:`core.parameters.DegradationParameters`, (m,).
-        fault_memories: records of :data:`records.FAULT_MEMORY`, (m,).
-        traffic: other vehicles, (M, 8).
-        plans: what they are going to do, records of :class:`core.parameters.TrafficParameters`, (M,).
+        automation: what the automation carries from step to step.
+        person: what a person at the wheel carries from step to step.
+        transition: what the reward needs from before and after the last step.
+        state: ego ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (6,).
+        line: reference line of the road, shape (n, 6).
+        faults: records of :class:`core.parameters.DegradationParameters`, shape (m,).
+        fault_memories: records of :data:`records.FAULT_MEMORY`, shape (m,).
+        traffic: other vehicles, columns as in :mod:`core.records`, shape (M, 8).
+        plans: plans of the other vehicles, records of :class:`core.parameters.TrafficParameters`, shape (M,).
     """
 
     p: Parameters
@@ -94,11 +95,11 @@ class Environment(NamedTuple):
 
 @jit_inlined
 def environment(i: int, batch: Batch) -> Environment:
-    """Environment i of a batch: views, nothing is copied.
+    """Environment i of a batch. Its fields are views; nothing is copied.
 
     Args:
-        i: which.
-        batch: of all.
+        i: index of the environment.
+        batch: state of all environments.
     """
     return Environment(
         batch.parameters[i],
@@ -118,10 +119,12 @@ def environment(i: int, batch: Batch) -> Environment:
 
 
 class Starts(NamedTuple):
-    """What every episode starts from, one entry; none where episodes are drawn, whose starts are in the batch already.
+    """The fixed start of every episode.
+
+    The arrays have one entry. They are empty where episodes are drawn at random: the batch then holds the start.
 
     Attributes:
-        parameters, states, lines, faults, traffic, plans: as those of :class:`Batch`.
+        parameters, states, lines, faults, traffic, plans: as the fields of :class:`Batch`, with N = 1 or N = 0.
     """
 
     parameters: np.ndarray
@@ -133,10 +136,14 @@ class Starts(NamedTuple):
 
 
 class Calls(NamedTuple):
-    """Where the compiled functions are that the loop calls by address; 0 for what nobody bound or loaded.
+    """Addresses of the compiled functions that the loop calls by address; 0 for a function not bound or not loaded.
 
     Attributes:
-        automate, triangulate, search, drive, allocate, observe: of the functions of these names.
+        automate: address of the automation's controller, see :data:`control.automation.AUTOMATE`.
+        triangulate, search: addresses of the two steps that find the safe area, see :mod:`core.risk.finding`.
+        drive: address of the predictive driver, see :data:`control.predictive_driver.DRIVE`.
+        allocate: address of the allocator of authority, see :data:`authority.allocators.ALLOCATE`.
+        observe: address of the function that writes the observation, see :data:`feedback.observation.WRITE`.
     """
 
     automate: int
@@ -148,19 +155,19 @@ class Calls(NamedTuple):
 
 
 NOT_LOADED = Calls(0, 0, 0, 0, 0, 0)
-"""Before the first reset."""
+"""The addresses before the first reset."""
 
 
 class Setup(NamedTuple):
-    """What all environments share.
+    """What all environments of a batch share.
 
     Attributes:
-        starts: of the episodes.
-        steps: length of an episode in decisions.
-        frames: simulation steps of one decision.
-        dt: of a simulation step [s].
-        calls: where the compiled functions are.
-        scales: of the observation's features, (n,).
+        starts: fixed start of the episodes.
+        steps: duration of an episode [time steps].
+        frames: number of simulation steps per time step.
+        dt: duration of a simulation step [s].
+        calls: addresses of the compiled functions.
+        scales: scales of the observation's features, in the units of the features, shape (n,).
     """
 
     starts: Starts
@@ -172,14 +179,14 @@ class Setup(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What a step gives, one entry an environment.
+    """Outputs of a step, one entry per environment.
 
     Attributes:
-        observations: (N, n), float32.
-        rewards: (N,).
-        terminations, truncations: (N,).
-        infos: records of :data:`feedback.info.INFO`, (N,).
-        drivers: records of :data:`control.predictive_driver.DRIVER_REPORT`, (N,).
+        observations: features divided by their scales [-], float32, shape (N, n).
+        rewards: rewards [-], shape (N,).
+        terminations, truncations: whether the episode has terminated or was truncated, shape (N,).
+        infos: records of :data:`feedback.info.INFO`, shape (N,).
+        drivers: records of :data:`control.predictive_driver.DRIVER_REPORT`, shape (N,).
     """
 
     observations: np.ndarray
@@ -191,15 +198,15 @@ class Outputs(NamedTuple):
 
 
 class Work:
-    """Scratch of one thread.
+    """Scratch memory of one thread.
 
     Attributes:
-        condensing: of the automation's solver.
-        finding: of the safe area.
-        automation_view: the scene as the automation takes it to be.
-        row: the ego as a row of traffic.
-        plant: of the vehicle's step.
-        command: the driver's, ``[a, delta]`` [m/s^2, rad].
+        condensing: scratch of both predictive controllers.
+        finding: scratch of the search for the safe area.
+        automation_view: the scene as the automation perceives it.
+        row: the ego as a row of the traffic array.
+        plant: scratch of the vehicle's simulation step.
+        command: the driver's desired command ``[a, delta]`` [m/s^2, rad].
     """
 
     condensing: condensing.Workspace

@@ -1,7 +1,7 @@
-"""Calls of single functions from Python, for controllers and vehicles that have their own objects there.
+"""Entry points that call single core functions from Python, for controllers and vehicles that are Python objects.
 
-Numba takes an array of any type in half a microsecond but a record by itself in ten, so these take 0-d arrays and hand
-their one record, ``array[()]``, on.
+Numba accepts an array argument of any type in half a microsecond, but a record argument takes ten. These functions
+therefore take 0-d arrays and pass on the one record that each array holds, ``array[()]``.
 """
 
 from __future__ import annotations
@@ -18,14 +18,22 @@ from shared_control_env.core.world import traffic as vehicles
 from shared_control_env.core.world import vehicle
 
 Boxed: TypeAlias = Any
-"""A record as a 0-d array."""
+"""A record held in a 0-d array."""
 
 _automate = AUTOMATE.call
 
 
 @jit
 def drive(state: np.ndarray, a: float, delta: float, dt: float, parameters: Boxed, work: Boxed) -> None:
-    """:func:`world.vehicle.plant_step`."""
+    """Advance the plant by one step, see :func:`world.vehicle.plant_step`.
+
+    Args:
+        state: ego ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
+        a, delta: command [m/s^2, rad], held over the step.
+        dt: step [s].
+        parameters: :class:`core.parameters.Parameters`, a 0-d array.
+        work: scratch, shape (2, 6).
+    """
     vehicle.plant_step(state, a, delta, dt, parameters[()].vehicle, work)
 
 
@@ -39,25 +47,58 @@ def decide_acceleration(
     line: np.ndarray,
     lane_width: float,
 ) -> None:
-    """:func:`world.traffic.decide_acceleration`."""
+    """Decide the acceleration of one other vehicle, see :func:`world.traffic.decide_acceleration`.
+
+    Args:
+        row: the vehicle's row of the traffic array, its acceleration is written, shape (8,).
+        plan: :class:`core.parameters.TrafficParameters` of the vehicle, a 0-d array.
+        t: time [s].
+        ego: the ego as a row of the traffic array, shape (8,).
+        traffic: all other vehicles, shape (n, 8).
+        line: reference line, shape (m, 6).
+        lane_width: width of a lane [m].
+    """
     vehicles.decide_acceleration(row, plan[()], t, ego, traffic, line, lane_width)
 
 
 @jit
 def move_along(row: np.ndarray, plan: Boxed, line: np.ndarray, t: float, dt: float) -> None:
-    """:func:`world.traffic.move_along`."""
+    """Move one other vehicle along the road, see :func:`world.traffic.move_along`.
+
+    Args:
+        row: the vehicle's row of the traffic array, overwritten, shape (8,).
+        plan: :class:`core.parameters.TrafficParameters` of the vehicle, a 0-d array.
+        line: reference line, shape (m, 6).
+        t: time [s].
+        dt: step [s].
+    """
     vehicles.move_along(row, plan[()], line, t, dt)
 
 
 @jit
 def clear_automation(memory: Boxed) -> None:
-    """:func:`control.automation.clear_automation`."""
+    """Reset the automation's memory, see :func:`control.automation.clear_automation`.
+
+    Args:
+        memory: record of :data:`records.AUTOMATION_MEMORY`, a 0-d array, overwritten.
+    """
     forget(memory[()])
 
 
 @jit
 def automate(address: int, scene: Boxed, parameters: Boxed, memory: Boxed, work: Boxed) -> tuple[int, int, float]:
-    """:func:`control.automation.automate`, at the address of its compiled form."""
+    """Compute the automation's desired command, see :func:`control.automation.automate`.
+
+    Args:
+        address: address of the compiled function.
+        scene: record of :data:`records.SCENE`, a 0-d array.
+        parameters: :class:`core.parameters.Parameters`, a 0-d array.
+        memory: record of :data:`records.AUTOMATION_MEMORY`, a 0-d array; ``u_a_des`` is written.
+        work: record of :data:`condensing.WORKSPACE`, a 0-d array.
+
+    Returns:
+        Status, number of iterations and residual of the solver.
+    """
     return _automate(address, scene[()], parameters[()], memory[()], work[()])
 
 
@@ -74,20 +115,43 @@ def build_program(
     low: np.ndarray,
     high: np.ndarray,
 ) -> None:
-    """:func:`control.driver.build_program`."""
+    """Build the driver's quadratic program, see :func:`control.driver.build_program`.
+
+    Args:
+        scene: record of :data:`records.SCENE`, a 0-d array.
+        u_last: the driver's last desired command [m/s^2, rad], shape (2,).
+        u_h_act: the driver's present actual command [m/s^2, rad], shape (2,).
+        parameters: :class:`core.parameters.Parameters`, a 0-d array.
+        work: record of :data:`condensing.WORKSPACE`, a 0-d array.
+        P, q: quadratic and linear cost, written, shapes (n + 1, n + 1) and (n + 1,) with n = 2 H_c.
+        A: constraint matrix, written, shape (:func:`control.driver.count_rows`, n + 1).
+        low, high: bounds of the rows of A, written, one entry per row.
+    """
     driver.build_program(scene[()], u_last, u_h_act, parameters[()], work[()], P, q, A, low, high)
 
 
 @jit
 def advance_arm(u_h_act: np.ndarray, u_h_des: np.ndarray, u_a_act: np.ndarray, parameters: Boxed) -> None:
-    """:func:`control.driver_lag.advance_lag` of a driver's arm."""
+    """Advance the lag of the driver's arm by one time step, see :func:`control.driver_lag.advance_lag`.
+
+    Args:
+        u_h_act: the driver's actual command [m/s^2, rad], overwritten, shape (2,).
+        u_h_des: the driver's desired command [m/s^2, rad], shape (2,).
+        u_a_act: the automation's actual command [m/s^2, rad], shape (2,).
+        parameters: :class:`core.parameters.Parameters`, a 0-d array.
+    """
     p = parameters[()]
     driver_lag.advance_lag(u_h_act, u_h_des, u_a_act, p.task.dt, p.lag)
 
 
 @jit
 def clear_person(memory: Boxed, parameters: Boxed) -> None:
-    """:func:`control.person.clear_person`."""
+    """Reset the person's memory, see :func:`control.person.clear_person`.
+
+    Args:
+        memory: record of :data:`records.PERSON_MEMORY`, a 0-d array, overwritten.
+        parameters: :class:`core.parameters.Parameters`, a 0-d array.
+    """
     person.clear_person(memory[()], parameters[()])
 
 
@@ -99,11 +163,28 @@ def take_in(
     parameters: Boxed,
     seen: Boxed,
 ) -> bool:
-    """:func:`control.person.take_in`."""
+    """Compute what the person perceives, see :func:`control.person.take_in`.
+
+    Args:
+        scene: record of :data:`records.SCENE`, a 0-d array.
+        u_last: command that drove the vehicle in the previous step [m/s^2, rad], shape (2,).
+        memory: record of :data:`records.PERSON_MEMORY`, a 0-d array, updated.
+        parameters: :class:`core.parameters.Parameters`, a 0-d array.
+        seen: copy of the scene, a 0-d array, changed to what the person perceives.
+
+    Returns:
+        Whether the person drives.
+    """
     return person.take_in(scene[()], u_last, memory[()], parameters[()], seen[()])
 
 
 @jit
 def with_arm_noise(u_h_des: np.ndarray, memory: Boxed, parameters: Boxed) -> None:
-    """:func:`control.person.with_arm_noise`."""
+    """Apply the noise of the person's arm to a command, see :func:`control.person.with_arm_noise`.
+
+    Args:
+        u_h_des: the driver's desired command [m/s^2, rad], overwritten, shape (2,).
+        memory: record of :data:`records.PERSON_MEMORY`, a 0-d array.
+        parameters: :class:`core.parameters.Parameters`, a 0-d array.
+    """
     person.with_arm_noise(u_h_des, memory[()], parameters[()])

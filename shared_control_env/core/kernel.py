@@ -1,7 +1,8 @@
-"""The kernel: the loop of many environments, each by itself, shared among threads. A single environment is one of one.
+"""The kernel: runs the loop of many independent environments, which several threads share among them.
 
-Where Python has to come in between (an automation of one's own, vehicles of highway-env's, more vehicles in the driving
-region than the compiled triangulation takes), the same calls of the loop are made one after the other:
+A single environment is a batch of size one. :func:`advance` makes whole time steps in compiled code. Some steps need
+Python in between: those with a user-defined automation, with highway-env's own vehicles, or with more vehicles in the
+driving region than the compiled triangulation accepts. For these, Python calls the parts of a step one after the other:
 :func:`respond`, :func:`look`, :func:`judge`, :func:`finish`.
 """
 
@@ -41,7 +42,10 @@ from shared_control_env.core.world.scene import holes_in_region, perceive
 allocate, drive = ALLOCATE.call, DRIVE.call
 
 TAKEN_AT_ONCE = 4
-"""Environments that a thread takes at a time: few, so that one that is held up leaves the others no long wait."""
+"""Number of environments that a thread takes at a time.
+
+It is small, so that the other threads do not wait long for a thread that is delayed.
+"""
 
 
 @jit_inlined
@@ -55,17 +59,22 @@ def fill_slots(
     program: Program,
     report: DriverReport,
 ) -> float:
-    """Bring both slots of the action together: the driver's command in ``work.command``, and alpha_a, returned.
+    """Fill both slots of a step, the driver's command and alpha_a, from bound functions or from the action.
+
+    A slot is bound where ``setup.calls`` holds the address of a driver or of an allocator.
 
     Args:
-        i: the environment.
-        commands: driver's commands over their limits, (N, 2); not read where a driver is bound.
-        alphas: authorities, (N, 1); not read where an allocator is bound.
+        i: index of the environment.
+        commands: the driver's commands divided by their limits [-], shape (N, 2); ignored where a driver is bound.
+        alphas: authorities of the automation [-], shape (N, 1); ignored where an allocator is bound.
         e: environment i.
-        setup: which slots are bound.
-        work: scratch.
-        program: record of :data:`predictive_driver.PROGRAM`; not read where no driver is bound.
-        report: record of :data:`predictive_driver.DRIVER_REPORT`, written.
+        setup: what all environments share; its calls say which slots are bound.
+        work: scratch; ``work.command`` receives the driver's desired command [m/s^2, rad].
+        program: record of :data:`predictive_driver.PROGRAM`; unused where no driver is bound.
+        report: record of :data:`predictive_driver.DRIVER_REPORT`, written where a driver is bound.
+
+    Returns:
+        alpha_a, clipped to [0, 1] [-].
     """
     if setup.calls.drive != 0:
         drive(setup.calls.drive, e.scene, e.p, e.memory, e.person, work.condensing, program, report)
@@ -81,11 +90,11 @@ def fill_slots(
 
 @jit
 def copy_rows(source: np.ndarray, target: np.ndarray) -> None:
-    """Copy an array of rows into another.
+    """Copy a two-dimensional array into another.
 
     Args:
-        source: shape (n, m).
-        target: of the same shape, overwritten.
+        source: array to copy, shape (n, m).
+        target: array of the same shape, overwritten.
     """
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
@@ -94,7 +103,17 @@ def copy_rows(source: np.ndarray, target: np.ndarray) -> None:
 
 @jit_inlined
 def begin(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
-    """Begin an episode of environment i, whose drawn start is in the batch or whose fixed one is copied there."""
+    """Begin an episode of environment i: set its start and clear all that the last episode left.
+
+    A fixed start is copied from ``setup.starts`` into the batch. Where starts are drawn at random, ``setup.starts``
+    is empty and the batch already holds the start.
+
+    Args:
+        i: index of the environment.
+        batch: state of all environments; entry i is written.
+        setup: what all environments share.
+        out: outputs of all environments; the driver's report of environment i is cleared.
+    """
     starts = setup.starts
     if starts.parameters.shape[0] > 0:
         batch.parameters[i] = starts.parameters[0]
@@ -119,13 +138,27 @@ def begin(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
 
 @jit_inlined
 def note(i: int, e: Environment, out: Outputs) -> None:
-    """Info of the signals of environment i's present time step."""
+    """Copy the signals of the present time step of environment i to its info.
+
+    Args:
+        i: index of the environment.
+        e: environment i.
+        out: outputs of all environments; the info of environment i is written up to ``automation``.
+    """
     note_signals(e.scene, e.signals, e.faults, e.automation.failures, out.infos[i])
 
 
 @jit_inlined
 def conclude(i: int, resetting: bool, e: Environment, setup: Setup, out: Outputs) -> None:
-    """What a step, or a reset, gives: reward, ends, info and observation."""
+    """Write the outputs of a step or of a reset: reward, end of the episode, info and observation.
+
+    Args:
+        i: index of the environment.
+        resetting: whether an episode has just begun; the reward is then 0 and no end is reported.
+        e: environment i.
+        setup: what all environments share.
+        out: outputs of all environments; the entries of environment i are written.
+    """
     if resetting:
         note(i, e, out)
         clear_transition(e.transition, is_on_road(e.scene, e.p))
@@ -149,7 +182,19 @@ def advance_one(
     work: Work,
     program: Program,
 ) -> None:
-    """Step environment i, or begin its next episode; arguments as those of :func:`advance`."""
+    """Advance environment i by one time step, or begin its next episode.
+
+    Args:
+        i: index of the environment.
+        resetting: whether to begin an episode instead of making a time step.
+        commands: the driver's commands divided by their limits [-], shape (N, 2).
+        alphas: authorities of the automation [-], shape (N, 1).
+        batch: state of all environments; entry i is written.
+        setup: what all environments share.
+        out: outputs of all environments; the entries of environment i are written.
+        work: scratch of this thread, record of :data:`batch.WORK`.
+        program: record of :data:`predictive_driver.PROGRAM` of this thread.
+    """
     e = environment(i, batch)
     k = 0
     if resetting:
@@ -180,7 +225,22 @@ def advance_through(
     work: Work,
     program: Program,
 ) -> None:
-    """Advance environment i by some steps in a row; arguments as those of :func:`advance`."""
+    """Advance environment i by several consecutive time steps.
+
+    Args:
+        i: index of the environment.
+        steps: number of time steps.
+        anew: whether to begin the next episode once one has ended (autoreset); if False, stop at the end.
+        commands: the driver's commands divided by their limits [-], shape (N, 2), held over the steps.
+        alphas: authorities of the automation [-], shape (N, 1), held over the steps.
+        batch: state of all environments; entry i is written.
+        setup: what all environments share.
+        out: outputs of all environments; the entries of environment i are those of its last step.
+        rewards: reward of every step, column i is written, shape (steps, N).
+        ends: whether the episode ended at each step, column i is written, shape (steps, N).
+        work: scratch of this thread, record of :data:`batch.WORK`.
+        program: record of :data:`predictive_driver.PROGRAM` of this thread.
+    """
     for k in range(steps):
         resetting = batch.ended[i]
         if resetting and not anew:
@@ -207,25 +267,28 @@ def advance(
     programs: np.ndarray,
     thread: int,
 ) -> None:
-    """Advance the environments, each by some steps in a row.
+    """Advance all active environments, each by several consecutive time steps; every thread makes this call.
 
-    As many threads as there are shares of the environments call it; each first takes those of its own share, which
-    its core's cache may hold from the step before, then helps with the other shares.
+    The environments are divided into as many shares as there are threads. Each thread first takes the environments of
+    its own share, since the cache of its core may still hold them from the previous step. Then it helps with the other
+    shares.
 
     Args:
-        taken: environments of each share that threads have taken so far, (threads,).
-        steps: how many time steps; the actions are held or bound.
-        active: environments that are advanced at all, (N,).
-        anew: whether an environment whose episode has ended begins the next in a step; if not, it stands still.
-        commands: driver's commands over their limits, (N, 2).
-        alphas: authorities, (N, 1).
-        batch, setup: see their types.
-        out: of the last step.
-        rewards: of every step, written, (steps, N).
-        ends: whether an episode ended at each step, written, (steps, N).
-        works: records of :data:`batch.WORK`, one a thread.
-        programs: records of :data:`predictive_driver.PROGRAM`, one a thread.
-        thread: which of them is ours.
+        taken: number of environments of each share that threads have taken so far, shared by them, shape (threads,).
+        steps: number of time steps; actions that are not bound are held over them.
+        active: whether each environment is advanced, shape (N,).
+        anew: whether an environment whose episode has ended uses a step to begin the next one (autoreset); if False,
+            the environment stops.
+        commands: the driver's commands divided by their limits [-], shape (N, 2).
+        alphas: authorities of the automation [-], shape (N, 1).
+        batch: state of all environments, see :class:`batch.Batch`.
+        setup: what all environments share, see :class:`batch.Setup`.
+        out: outputs of each environment's last step, written, see :class:`batch.Outputs`.
+        rewards: reward of every step, written, shape (steps, N).
+        ends: whether the episode ended at each step, written, shape (steps, N).
+        works: records of :data:`batch.WORK`, one per thread.
+        programs: records of :data:`predictive_driver.PROGRAM`, one per thread.
+        thread: index of this thread.
     """
     work, program = works[thread], programs[thread]
     n, shares = active.shape[0], taken.shape[0]
@@ -250,7 +313,17 @@ def respond(
     works: np.ndarray,
     programs: np.ndarray,
 ) -> None:
-    """The second half of environment 0's time step, without the motion; arguments as those of :func:`advance`."""
+    """Run the second half of environment 0's time step without moving the vehicles.
+
+    Args:
+        commands: the driver's commands divided by their limits [-], shape (N, 2).
+        alphas: authorities of the automation [-], shape (N, 1).
+        batch: state of all environments; entry 0 is written.
+        setup: what all environments share.
+        out: outputs of all environments; info and driver's report of environment 0 are written.
+        works: records of :data:`batch.WORK`; the first is used.
+        programs: records of :data:`predictive_driver.PROGRAM`; the first is used.
+    """
     e = environment(0, batch)
     depart(e)
     alpha_a = fill_slots(0, commands, alphas, e, setup, works[0], programs[0], out.drivers[0])
@@ -262,16 +335,20 @@ def respond(
 def look(
     k: int, resetting: bool, batch: Batch, setup: Setup, out: Outputs, works: np.ndarray, corners: np.ndarray
 ) -> int:
-    """Perceive environment 0's scene at time step k, its safe area too unless there are too many vehicles in the way.
+    """Perceive environment 0's scene at time step k, and find its safe area unless too many vehicles are in the region.
 
     Args:
         k: time step.
         resetting: whether an episode begins.
-        batch, setup, out, works: as those of :func:`advance`.
-        corners: written, of the vehicles in the driving region, (M, 4, 2).
+        batch: state of all environments; entry 0 is written.
+        setup: what all environments share.
+        out: outputs of all environments; the driver's report of environment 0 is cleared where an episode begins.
+        works: records of :data:`batch.WORK`; the first is used.
+        corners: corners (s, d) [m] of the vehicles in the driving region, written, shape (M, 4, 2).
 
     Returns:
-        How many vehicles are in the driving region; beyond MAX_HOLES the safe area is for :func:`search_among`.
+        Number of vehicles in the driving region. With more than MAX_HOLES the safe area is not found here; the caller
+        then uses :func:`search_among`.
     """
     if resetting:
         begin(0, batch, setup, out)
@@ -287,12 +364,13 @@ def look(
 
 @jit
 def search_among(triangles: np.ndarray, batch: Batch, works: np.ndarray, scratch: Scratch) -> None:
-    """Safe area of environment 0 through any number of triangles, which :func:`triangulation.triangulate_any` gives.
+    """Find the safe area of environment 0 from any number of triangles.
 
     Args:
-        triangles: shape (n, 3, 2).
-        batch, works: as those of :func:`advance`.
-        scratch: for as many triangles.
+        triangles: triangles of :func:`triangulation.triangulate_any`, vertices (s, d) [m], shape (n, 3, 2).
+        batch: state of all environments; the safe area of environment 0 is written.
+        works: records of :data:`batch.WORK`, unused.
+        scratch: scratch for at least n triangles.
     """
     e = environment(0, batch)
     region = e.scene.region
@@ -301,17 +379,25 @@ def search_among(triangles: np.ndarray, batch: Batch, works: np.ndarray, scratch
 
 @jit
 def show_automation(batch: Batch, works: np.ndarray) -> None:
-    """Environment 0's scene as its automation sees it, left in ``works[0].automation_view``."""
+    """Write environment 0's scene, as its automation perceives it, to ``works[0].automation_view``.
+
+    Args:
+        batch: state of all environments.
+        works: records of :data:`batch.WORK`; the first is written.
+    """
     works[0].automation_view = see(environment(0, batch), works[0])
 
 
 @jit
 def judge(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> None:
-    """Let environment 0's automation decide, unless another has; then the fault and the risk.
+    """Complete the first half of environment 0's time step: the automation's decision, the fault and the risk.
 
     Args:
-        automated: whether u_a,des is in the signals already.
-        batch, setup, works: as those of :func:`advance`.
+        automated: whether the signals already hold u_a,des of a user-defined automation; the built-in one is then
+            skipped.
+        batch: state of all environments; the signals of environment 0 are written.
+        setup: what all environments share.
+        works: records of :data:`batch.WORK`; the first is used.
     """
     e = environment(0, batch)
     if not automated:
@@ -322,5 +408,12 @@ def judge(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> Non
 
 @jit
 def finish(resetting: bool, batch: Batch, setup: Setup, out: Outputs) -> None:
-    """What environment 0's step, or reset, gives; arguments as those of :func:`look`."""
+    """Write the outputs of environment 0's step or reset.
+
+    Args:
+        resetting: whether an episode has just begun.
+        batch: state of all environments.
+        setup: what all environments share.
+        out: outputs of all environments; the entries of environment 0 are written.
+    """
     conclude(0, resetting, environment(0, batch), setup, out)

@@ -1,22 +1,23 @@
-"""The loop of human-machine shared control, one call a signal, in the order of the paper.
+"""The loop of human-machine shared control: one function call per signal, in the order of the paper.
 
-A time step k has two halves. :func:`plan` runs on what is perceived: the automation decides, the fault acts, the risk
-of letting that drive is assessed. :func:`act` runs once alpha_a and the driver's command are known: authority law,
-driver's lag, sum. Between them stand the two slots, of the allocator and of the driver (:mod:`core.kernel`)::
+A time step k has two halves. :func:`plan` runs on the perceived scene: the automation decides, the fault acts on the
+command, and the risk of the degraded command is assessed. :func:`act` runs once alpha_a and the driver's command are
+known: it applies the authority law and the driver's lag, and adds both commands. Between the two halves lie the slots
+of the allocator and of the driver, which :mod:`core.kernel` fills::
 
     perceive             scene      road frame, neighbours, driving region, targets
     find_safe_area       C          safe area (Table I)
     decide_automation    u_a,des    the automation's desired command (Eq. 12, 13)
-    degrade_command      u_a,f      the same, degraded (Eq. 17, 18)
+    degrade_command      u_a,f      the degraded command (Eq. 17, 18)
     assess               xi         prediction under u_a,f over tau_p (Eq. 1)
                          r_y, r_x   lateral and longitudinal risk (Eq. 2-8)
     (allocator)          alpha_a    authority of the automation (Eq. 9)
     apply_authority      u_a,act    the automation's actual command (Eq. 10)
     (driver)             u_h,des    the driver's desired command (Eq. 14, 15)
     apply_driver         u_h,act    the driver's actual command (Eq. 16)
-                         u          u_a,act + u_h,act within the limits, which drives the vehicle
+                         u          command of the vehicle: u_a,act + u_h,act, clipped to the limits
     move                            vehicle (Eq. 11) and traffic, to k + 1
-    evaluate                        reward and end, once the scene at k + 1 is planned for
+    evaluate                        reward and end of the episode, after plan has run at k + 1
 """
 
 from __future__ import annotations
@@ -56,12 +57,12 @@ automate = AUTOMATE.call
 
 @jit_inlined
 def plan(k: int, e: Environment, calls: Calls, work: Work) -> None:
-    """First half of a time step: from the poses of all vehicles to the risk of what the automation would do.
+    """Run the first half of a time step: from the poses of all vehicles to the risk of the automation's command.
 
     Args:
         k: time step.
-        e: the environment; scene and signals are written.
-        calls: where the compiled functions are.
+        e: the environment; its scene and signals are written.
+        calls: addresses of the compiled functions.
         work: scratch.
     """
     perceive(k, e.state, e.traffic, e.line, e.p, e.scene)
@@ -73,14 +74,30 @@ def plan(k: int, e: Environment, calls: Calls, work: Work) -> None:
 
 @jit_inlined
 def find_safe_area(e: Environment, calls: Calls, work: Work) -> None:
-    """The safe area C of the scene, around the vehicles in its driving region."""
+    """Find the safe area C of the scene, which excludes the vehicles in the driving region.
+
+    Args:
+        e: the environment; ``e.scene.area`` is written.
+        calls: addresses of the compiled functions.
+        work: scratch.
+    """
     count = holes_in_region(e.traffic, e.line, e.scene.region, work.finding.corners)
     find_area(count, e.scene, e.p, calls.triangulate, calls.search, work.finding)
 
 
 @jit_inlined
 def see(e: Environment, work: Work) -> Scene:
-    """The scene as the automation takes it to be; all others see it as it is."""
+    """Scene as the automation perceives it, with the errors of its perception.
+
+    The driver and the monitor use the true scene.
+
+    Args:
+        e: the environment; ``e.signals.misperception`` is written.
+        work: scratch; ``work.automation_view`` holds the returned scene where the automation misperceives.
+
+    Returns:
+        Record of :data:`records.SCENE`; the true scene itself where nothing is misperceived.
+    """
     misperceive(e.scene.t, e.faults, e.signals)
     if e.signals.misperception[0] == 0.0 and e.signals.misperception[1] == 0.0:
         return e.scene
@@ -91,7 +108,14 @@ def see(e: Environment, work: Work) -> Scene:
 
 @jit_inlined
 def decide_automation(seen: Scene, e: Environment, calls: Calls, work: Work) -> None:
-    """u_a,des from the scene as the automation sees it, and how the solver came to it."""
+    """Compute u_a,des from the scene as the automation perceives it, and report the solver's outcome.
+
+    Args:
+        seen: record of :data:`records.SCENE` as the automation perceives it, see :func:`see`.
+        e: the environment; its signals and the automation's memory are written.
+        calls: addresses of the compiled functions.
+        work: scratch.
+    """
     signals = e.signals
     status, iterations, residual = automate(calls.automate, seen, e.p, e.automation, work.condensing)
     signals.status, signals.iterations, signals.residual = status, iterations, residual
@@ -100,7 +124,14 @@ def decide_automation(seen: Scene, e: Environment, calls: Calls, work: Work) -> 
 
 @jit_inlined
 def degrade_command(e: Environment) -> None:
-    """u_a,f; where the fault is in the planner, u_a,des is wrong too, and at the actuator nothing is yet."""
+    """Compute u_a,f, the degraded command.
+
+    A fault in the planner also changes u_a,des. A fault at the actuator leaves u_a,f = u_a,des: it acts on u_a,act
+    in :func:`apply_authority`.
+
+    Args:
+        e: the environment; its signals and fault memories are written.
+    """
     signals = e.signals
     if e.p.authority.fault_at == ACTUATOR:
         for i in range(2):
@@ -115,12 +146,12 @@ def degrade_command(e: Environment) -> None:
 
 @jit_inlined
 def act(u_h_des: np.ndarray, alpha_a: float, e: Environment) -> None:
-    """Second half of a time step: from alpha_a and the driver's command to the one that drives the vehicle.
+    """Run the second half of a time step: from alpha_a and the driver's command to the vehicle's command u.
 
     Args:
         u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
-        alpha_a: authority of the automation in [0, 1].
-        e: the environment; signals and memory are written.
+        alpha_a: authority of the automation, in [0, 1] [-].
+        e: the environment; its signals, its memory and what the driver feels and sees of the automation are written.
     """
     apply_authority(alpha_a, e)
     apply_driver(u_h_des, e.p, e.scene, e.memory, e.signals)
@@ -128,7 +159,12 @@ def act(u_h_des: np.ndarray, alpha_a: float, e: Environment) -> None:
 
 @jit_inlined
 def apply_authority(alpha_a: float, e: Environment) -> None:
-    """u_a,act by Eq. 10, or another law; degradations at the actuator act on it after that."""
+    """Compute u_a,act by Eq. 10 or another law, then apply the degradations at the actuator to it.
+
+    Args:
+        alpha_a: authority of the automation, in [0, 1] [-].
+        e: the environment; its signals and fault memories are written.
+    """
     signals, choice = e.signals, e.p.authority
     signals.alpha_a = alpha_a
     apply_law(choice.law, signals.u_a_des, signals.u_a_f, alpha_a, e.p.law, choice.strict, signals.u_a_act)
@@ -140,14 +176,16 @@ def apply_authority(alpha_a: float, e: Environment) -> None:
 
 @jit
 def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memory, signals: Signals) -> None:
-    """u_h,act (Eq. 16), and ``u = clip(u_a,act + u_h,act)``.
+    """Compute u_h,act (Eq. 16) and the vehicle's command ``u = clip(u_a,act + u_h,act)``.
+
+    The lag advances after u is formed, so u_h,des first has an effect in the next time step.
 
     Args:
         u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
         p: parameters.
-        scene: record of :data:`records.SCENE`; the driver will have felt u_a,act and seen alpha_a.
-        memory: record of :data:`records.MEMORY`; the driver's lag advances.
-        signals: record of :data:`records.SIGNALS`, completed.
+        scene: record of :data:`records.SCENE`; ``felt`` (u_a,act) and ``displayed`` (alpha_a) are written.
+        memory: record of :data:`records.MEMORY`; the driver's lag advances, and the last commands are stored.
+        signals: record of :data:`records.SIGNALS`; ``u_h_des``, ``u_h_act`` and ``u`` are written.
     """
     for i in range(2):
         bound = p.limits.a_max if i == 0 else p.limits.delta_max
@@ -161,11 +199,11 @@ def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memor
 
 @jit_inlined
 def move(e: Environment, setup: Setup, work: Work) -> None:
-    """Move all vehicles through one decision's simulation steps, and check the ego's collisions.
+    """Move all vehicles through the simulation steps of one decision, and detect collisions of the ego.
 
     Args:
-        e: the environment; state, traffic and transition are written.
-        setup: number and length of the simulation steps.
+        e: the environment; its state, traffic and transition are written.
+        setup: number and duration of the simulation steps.
         work: scratch.
     """
     u, row = e.signals.u, work.row
@@ -186,21 +224,25 @@ def move(e: Environment, setup: Setup, work: Work) -> None:
 
 @jit_inlined
 def depart(e: Environment) -> None:
-    """Note what a step leads from, before anything moves."""
+    """Store the path length and the acceleration command from before a step, which the reward needs.
+
+    Args:
+        e: the environment; its transition is written.
+    """
     e.transition.previous_s, e.transition.last_a = e.scene.z[0], e.memory.u[0]
 
 
 @jit_inlined
 def evaluate(e: Environment, steps: int) -> tuple[float, bool, bool]:
-    """Reward and end of a step, once the scene that it led to is perceived.
+    """Compute the reward of a step and whether the episode ends, after the resulting scene has been perceived.
 
     Args:
-        e: the environment; memory and transition are written.
-        steps: duration of the episode in time steps.
+        e: the environment; its memory and transition are written.
+        steps: duration of the episode [time steps].
 
     Returns:
-        Reward; whether the episode terminates: by a collision, off the road, or in a state that is not finite; whether
-        it is truncated: by its duration, or since the road ends.
+        Reward; whether the episode terminates (collision, departure from the road, or a state that is not finite);
+        whether the episode is truncated (its duration has passed, or the road ends).
     """
     transition, x = e.transition, e.scene.state
     transition.on_road = is_on_road(e.scene, e.p) and np.isfinite(x[0] + x[1] + x[2] + x[3] + x[4] + x[5])
@@ -212,7 +254,7 @@ def evaluate(e: Environment, steps: int) -> tuple[float, bool, bool]:
 
 @jit
 def is_on_road(scene: Scene, p: Parameters) -> bool:
-    """Whether the ego's centre is between the road's edges.
+    """Whether the ego's centre lies between the edges of the road.
 
     Args:
         scene: record of :data:`records.SCENE`.
@@ -223,12 +265,12 @@ def is_on_road(scene: Scene, p: Parameters) -> bool:
 
 @jit_inlined
 def count_departures(scene: Scene, p: Parameters, memory: Memory) -> None:
-    """Count in memory each time that the ego's centre leaves the lane to keep.
+    """Count how often the ego's centre has left the lane to keep.
 
     Args:
         scene: record of :data:`records.SCENE`.
         p: parameters.
-        memory: record of :data:`records.MEMORY`.
+        memory: record of :data:`records.MEMORY`; ``in_lane`` and ``lane_departures`` are written.
     """
     in_lane = abs(scene.z[1] - scene.y_target) <= 0.5 * p.task.lane_width
     if memory.in_lane and not in_lane:
@@ -238,10 +280,10 @@ def count_departures(scene: Scene, p: Parameters, memory: Memory) -> None:
 
 @jit
 def clear_memory(memory: Memory) -> None:
-    """State of a loop that has not run: no command.
+    """Reset the loop's memory to its state before the first step: no commands, the ego in its lane.
 
     Args:
-        memory: record of :data:`records.MEMORY`.
+        memory: record of :data:`records.MEMORY`, overwritten.
     """
     for i in range(2):
         memory.u_h_act[i] = memory.u_h_des[i] = memory.u[i] = 0.0
@@ -252,10 +294,10 @@ def clear_memory(memory: Memory) -> None:
 
 @jit
 def clear_signals(signals: Signals) -> None:
-    """Signals before anything is planned or applied: no command, full authority.
+    """Reset the signals to their values before the first step: no commands, no risk, full authority.
 
     Args:
-        signals: record of :data:`records.SIGNALS`.
+        signals: record of :data:`records.SIGNALS`, overwritten.
     """
     for vector in (
         signals.u_a_des,
@@ -277,11 +319,11 @@ def clear_signals(signals: Signals) -> None:
 
 @jit
 def clear_transition(transition: Transition, on_road: bool) -> None:
-    """What has come of a start: nothing.
+    """Reset the transition at the start of an episode: no collision, no failure, all reward terms zero.
 
     Args:
-        transition: record of :data:`records.TRANSITION`.
-        on_road: whether the ego's centre is between the road's edges.
+        transition: record of :data:`records.TRANSITION`, overwritten.
+        on_road: whether the ego's centre lies between the edges of the road.
     """
     transition.crashed = transition.failed = False
     transition.on_road = on_road

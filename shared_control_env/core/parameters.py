@@ -1,8 +1,8 @@
 """Every parameter of the model with its unit, range, default and source.
 
-The classes are named tuples: immutable, documented, and passed as they are to the compiled functions.
+The classes are named tuples: they are immutable and can be passed to the compiled functions directly.
 Sources: *paper* is Huang et al., arXiv 2103.04563, with the table or equation; *ours* marks a choice
-that the paper leaves open. All units are SI, angles in radians.
+that the paper leaves open. All units are SI, and angles are in radians.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from annotated_types import Interval
 from shared_control_env.core.records import MAX_TERMS
 
 FASTEST = 60.0
-"""Highest speed that can be set [m/s]: half as much again as the model is right for."""
+"""Highest speed that can be set [m/s]: 1.5 times the speed up to which the model is valid."""
 
 LONGEST_ROAD = 1e5
-"""Longest road that can be set [m]: an hour at 100 km/h."""
+"""Longest road that can be set [m]: the distance covered in an hour at 100 km/h."""
 
 MOST_LANES = 30
-"""Largest number of lanes that can be set: the widest motorways have 26."""
+"""Largest number of lanes that can be set [-]: the widest motorways have 26."""
 
 LARGEST_ACCELERATION = 20.0
-"""Largest limit of the acceleration that can be set [m/s^2]: twice what road tyres transmit."""
+"""Largest acceleration limit that can be set [m/s^2]: twice what road tyres can transmit."""
 
 LARGEST_STEERING = math.pi / 2
-"""Bound of the limit of the steering angle [rad]: wheels across the car."""
+"""Upper bound of the steering limit, itself excluded [rad]: the wheels at a right angle to the car."""
 
-# Bounds of what can be set. In SI units nothing about a road vehicle is larger than a million, but for weights; squares
-# and quotients of what lies within stay far from the limits of floating point.
+# Bounds of the settings. In SI units, no quantity of a road vehicle except a weight exceeds one million. Squares and
+# quotients of values within these bounds stay far from the limits of floating point.
 Positive = Annotated[float, Interval(ge=1e-12, le=1e6)]
 NonNegative = Annotated[float, Interval(ge=0.0, le=1e6)]
 Fraction = Annotated[float, Interval(ge=0.0, le=1.0)]
@@ -41,8 +41,8 @@ PositiveWeight = Annotated[float, Interval(ge=1e-12, le=1e12)]
 Speed = Annotated[float, Interval(ge=0.0, le=FASTEST)]  # [m/s]
 TargetSpeed = Annotated[float, Interval(ge=0.1, le=FASTEST)]  # [m/s]
 Mass = Annotated[float, Interval(ge=100.0, le=1e5)]  # [kg], from a light quadricycle to a road train
-Inertia = Annotated[float, Interval(ge=10.0, le=1e6)]  # [kg m^2], of the same
-BodyLength = Annotated[float, Interval(ge=0.1, le=30.0)]  # [m], of the same
+Inertia = Annotated[float, Interval(ge=10.0, le=1e6)]  # [kg m^2], for the same range of vehicles
+BodyLength = Annotated[float, Interval(ge=0.1, le=30.0)]  # [m], for the same range of vehicles
 BodyWidth = Annotated[float, Interval(ge=0.1, le=5.0)]  # [m]
 Stiffness = Annotated[float, Interval(ge=1e3, le=1e7)]  # [N/rad]
 
@@ -57,10 +57,10 @@ class VehicleParameters(NamedTuple):
         l_r: distance from the centre of mass to the rear axle [m]; paper, Table III.
         C_f: cornering stiffness of one front tyre [N/rad]; ours (the paper prints none).
         C_r: cornering stiffness of one rear tyre [N/rad]; ours (the paper prints none).
-        length: body length [m]; highway-env's vehicle.
+        length: body length [m]; that of highway-env's vehicle.
         width: body width v_w [m]; paper, Table V.
-        mu: friction of tyre and road [-]; ours, for tyres that heed it (Eq. 11's do not).
-        tyre: where the compiled force of its tyres is (:mod:`core.world.tyre`), 0 for Eq. 11's linear ones.
+        mu: friction coefficient of tyre and road [-]; ours. The linear tyres of Eq. 11 do not use it.
+        tyre: address of the compiled tyre force (:mod:`core.world.tyre`); 0 for the linear tyres of Eq. 11.
     """
 
     m: Mass = 2000.0
@@ -90,16 +90,17 @@ class Limits(NamedTuple):
 class PredictiveParameters(NamedTuple):
     """Horizon and weights of both predictive controllers (Eq. 13, 15).
 
-    The paper prints the horizons but no weights. With these the healthy automation brings a lane error of 1 m
-    under 5 cm in 1.75 s with an overshoot of 0.23 m, and in Case 1 the degraded automation alone leaves
-    the lane (2.4 m) while the driver holds it (0.6 m). The same values serve the driver, as the paper says.
-    The paper's driver does not know the lag of Eq. 16, so that without the automation (law ``driver_only``) it
-    oscillates from a lane error of 1 m at all of some twenty weightings tried; with the lag in its model
-    (:class:`InternalModelParameters`) it does not, at the same weights and horizons.
+    The paper prints the horizons but no weights. With the default weights, the healthy automation reduces a lane error
+    of 1 m to less than 5 cm in 1.75 s, with an overshoot of 0.23 m. In Case 1 the degraded automation alone leaves the
+    lane (2.4 m), while the driver keeps the lane (0.6 m). The driver uses the same values, as the paper says.
+
+    The paper's driver does not know the lag of Eq. 16. Without the automation (law ``driver_only``) this driver
+    oscillates after a lane error of 1 m, at each of some twenty weightings tried. A driver whose model contains the lag
+    (:class:`InternalModelParameters`) does not oscillate at the same weights and horizons.
 
     Attributes:
         H_p: prediction horizon [steps]; paper, Section VI.
-        H_c: control horizon [steps], the last command is held after it; paper, Section VI.
+        H_c: control horizon [steps]; the last command is held after it; paper, Section VI.
         W: weight of the lateral error squared [1/m^2]; ours.
         H: weight of the speed error squared [s^2/m^2]; ours.
         N: weight of the yaw acceleration squared [s^4/rad^2]; ours.
@@ -122,7 +123,7 @@ class SafeAreaParameters(NamedTuple):
     """Extent of the driving region (Table I).
 
     Attributes:
-        look_ahead: length of the region when no vehicle precedes [m]; ours.
+        look_ahead: length of the region without a preceding vehicle [m]; ours.
         d_o: clearance kept behind the preceding vehicle [m]; paper, Table V.
     """
 
@@ -152,8 +153,8 @@ class LongitudinalRiskParameters(NamedTuple):
     Attributes:
         alpha: height of the relative-speed field [-]; paper, Table V.
         A_f: height of the distance field [-]; paper, Table V.
-        sigma_x: width of the distance field [m], used where ``graded`` is false; paper, Table V.
-        graded: take sigma_x = 2 d^s instead (the text's "2 d_o" read with the distance of Eq. 8); ours.
+        sigma_x: width of the distance field [m], used where ``graded`` is False; paper, Table V.
+        graded: whether sigma_x = 2 d^s instead (the text's "2 d_o", read with the distance of Eq. 8); ours.
         b: shape of the distance field [-]; paper, Table V.
         a_max: largest deceleration of all vehicles [m/s^2]; paper, Table V.
         t_r: reaction time [s]; paper, Table V.
@@ -165,7 +166,7 @@ class LongitudinalRiskParameters(NamedTuple):
         w_f_change: weight of the follower during a lane change [-]; paper, Table V.
         w_l_change: weight of the leader during a lane change [-]; paper, Table V.
         w_p_change: weight of the preceding vehicle during a lane change [-]; paper, Table V.
-        bumper_to_bumper: subtract one vehicle length from the distance of the centres; ours.
+        bumper_to_bumper: whether one vehicle length is subtracted from the distance between the centres; ours.
     """
 
     alpha: Positive = 10.0
@@ -190,8 +191,8 @@ class LawParameters(NamedTuple):
     """Tolerances of the first line of Eq. 10, in physical units; both ours.
 
     Attributes:
-        tolerance_a: |a_f - a_des| still counted as equal [m/s^2].
-        tolerance_delta: |delta_f - delta_des| still counted as equal [rad].
+        tolerance_a: largest |a_f - a_des| that counts as equal [m/s^2].
+        tolerance_delta: largest |delta_f - delta_des| that counts as equal [rad].
     """
 
     tolerance_a: NonNegative = 0.01
@@ -202,7 +203,7 @@ class DriverLagParameters(NamedTuple):
     """Neuromuscular response of the driver (Eq. 16).
 
     Attributes:
-        K_h: proportional gain [-]; paper, Section VI (0 takes the hands off the wheel).
+        K_h: proportional gain [-]; paper, Section VI. With 0 the driver's hands are off the wheel.
         T_h: time constant [s]; paper, Section VI.
     """
 
@@ -211,12 +212,14 @@ class DriverLagParameters(NamedTuple):
 
 
 class InternalModelParameters(NamedTuple):
-    """What the predictive driver knows of its own arm (Eq. 16 within Eq. 15); ours, the paper's driver knows nothing.
+    """What the predictive driver knows of its own arm (Eq. 16 within Eq. 15).
+
+    All values are ours: the paper's driver does not know its arm.
 
     Attributes:
-        active: whether the response is part of the model that the driver predicts with.
-        K_h: gain that the driver believes to have [-].
-        T_h: time constant that the driver believes to have [s].
+        active: whether the arm's response is part of the model that the driver predicts with.
+        K_h: gain of the arm that the driver assumes [-].
+        T_h: time constant of the arm that the driver assumes [s].
     """
 
     active: bool = False
@@ -225,27 +228,30 @@ class InternalModelParameters(NamedTuple):
 
 
 class PersonParameters(NamedTuple):
-    """What is between the eye and the command of a person at the wheel (:mod:`core.control.person`); all ours.
+    """Perception, attention and arm of a person at the wheel (:mod:`core.control.person`); all ours.
 
     Attributes:
-        active: whether the predictive driver is a person; all else acts then alone.
-        engaged: whether the person drives from the start; else the hands rest until something is noticed.
-        delay: from the road to the eye's picture of it [s]; 0.15 to 0.25 s with visual and vestibular senses in
-            steering (Nash & Cole, Vehicle System Dynamics 58(4), 2020).
-        weber: standard deviation of what is perceived over its size [-]; a Weber fraction of about 0.1 (the same).
-        noise_time: correlation time of that error, and of the arm's [s]; assumed.
-        lane_position: error of the position in the lane that is noticed [m]; assumed: the body is 0.2 m from the line.
-        heading: heading relative to the road that is noticed [rad]; assumed.
-        headway: time headway under which the vehicle ahead is noticed [s]; assumed.
-        felt_steering: steering felt at the wheel, beyond what the road's curvature asks for, that is noticed [rad];
-            assumed.
-        felt_acceleration: acceleration of the automation, beyond what the person would do, that is noticed [m/s^2];
-            assumed.
-        display: displayed authority alpha_a under which it is noticed [-]; assumed.
+        active: whether the predictive driver is a person; the other fields have an effect only then.
+        engaged: whether the person drives from the start; if not, the hands rest until the person notices something.
+        delay: delay of perception [s]; 0.15 to 0.25 s with visual and vestibular senses in steering (Nash & Cole,
+            Vehicle System Dynamics 58(4), 2020).
+        weber: standard deviation of the error of a perceived quantity, divided by that quantity [-]; a Weber fraction
+            of about 0.1 (same source).
+        noise_time: correlation time of the errors of perception and of the arm [s]; assumed.
+        lane_position: smallest error of the lane position that is noticed [m]; assumed: the body is then 0.2 m from
+            the line.
+        heading: smallest heading relative to the road that is noticed [rad]; assumed.
+        headway: time headway below which the vehicle ahead is noticed [s]; assumed.
+        felt_steering: smallest steering angle, felt at the wheel beyond what the road's curvature requires, that is
+            noticed [rad]; assumed.
+        felt_acceleration: smallest difference between the automation's acceleration and the person's own choice that
+            is noticed [m/s^2]; assumed.
+        display: displayed authority alpha_a below which the display is noticed [-]; assumed.
         response: median time from noticing to acting [s]; log-normal over persons, see :data:`PERSONS`.
-        response_spread: standard deviation of its logarithm [-].
-        arm_noise: standard deviation of the command over its size, signal-dependent noise of the arm [-]; assumed.
-        seed: of all that is random in the person.
+        response_spread: standard deviation of the logarithm of that time [-].
+        arm_noise: standard deviation of the error of a command, divided by the command: signal-dependent noise of the
+            arm [-]; assumed.
+        seed: seed of all random numbers of the person.
     """
 
     active: bool = False
@@ -266,7 +272,7 @@ class PersonParameters(NamedTuple):
 
 
 TRAFFIC_BODY = (5.0, 2.0)
-"""Length and width of highway-env's vehicles [m]."""
+"""Length and width of the bodies of highway-env's vehicles [m]."""
 
 PERSONS: dict[str, PersonParameters] = {
     "attentive": PersonParameters(active=True),
@@ -275,11 +281,14 @@ PERSONS: dict[str, PersonParameters] = {
 }
 """Persons by name.
 
-``attentive`` expects the fault and drives all the time. ``hands_on`` rests the hands on the wheel: with hands on it,
-steering reactions at a curve's system limit took 1.18 to 1.74 s (Paula et al., Sensors 23(24):9785, 2023); the median
-of 1.2 s is at the lower end, since the time here runs from the moment something passes a threshold, which is later than
-the fault; the spread is assumed. ``hands_off`` feels hardly anything at the wheel and takes 2.7 s, about the mean of
-129 studies of take-over times (Zhang et al., 2019; the number is yet to be verified); its spread is assumed.
+``attentive``: expects the fault and drives all the time.
+
+``hands_on``: rests the hands on the wheel. With the hands on the wheel, steering reactions at a system limit in a curve
+took 1.18 to 1.74 s (Paula et al., Sensors 23(24):9785, 2023). The median here, 1.2 s, is at the lower end, because the
+time here starts when a quantity passes its threshold, which is later than the fault. The spread is assumed.
+
+``hands_off``: feels hardly anything at the wheel and takes 2.7 s, about the mean of 129 studies of take-over times
+(Zhang et al., 2019; the number is yet to be verified). The spread is assumed.
 """
 
 
@@ -295,12 +304,12 @@ IDENTIFIED_DRIVERS: dict[str, DriverLagParameters] = {
 
 
 class RewardParameters(NamedTuple):
-    """Terms of the reward (:mod:`core.feedback.reward`), and how much each counts; all ours.
+    """Terms of the reward (:mod:`core.feedback.reward`) and their weights; all ours.
 
     Attributes:
-        n_terms: how many there are.
-        addresses: where their compiled functions are, shape (MAX_TERMS,).
-        weights: of the terms [-], shape (MAX_TERMS,).
+        n_terms: number of terms.
+        addresses: addresses of the terms' compiled functions, shape (MAX_TERMS,).
+        weights: weights of the terms [-], shape (MAX_TERMS,).
     """
 
     n_terms: int = 0
@@ -309,7 +318,11 @@ class RewardParameters(NamedTuple):
 
 
 def fitted_arms() -> tuple[tuple[float, float], tuple[float, float]]:
-    """Log-normal fit of the five drivers of Table IV: median and deviation of the logarithm, of K_h and of T_h."""
+    """Log-normal fit of K_h and T_h over the five drivers of Table IV.
+
+    Returns:
+        Median and standard deviation of the logarithm, first of K_h and then of T_h.
+    """
     five = [lag for name, lag in IDENTIFIED_DRIVERS.items() if name != "average"]
     fits = []
     for values in zip(*five, strict=True):
@@ -319,10 +332,13 @@ def fitted_arms() -> tuple[tuple[float, float], tuple[float, float]]:
 
 
 def critical_speed(vehicle: VehicleParameters) -> float:
-    """Speed above which an oversteering car is unstable [m/s]; infinite for an understeering one.
+    """Speed above which an oversteering car is unstable [m/s]; infinite for a car that does not oversteer.
 
-    ``v_crit = L sqrt(2 C_f C_r / (m (l_f C_f - l_r C_r)))`` with ``L = l_f + l_r`` and the
-    stiffness per tyre, two tyres an axle (Rajamani, Vehicle Dynamics and Control, Section 3.3).
+    ``v_crit = L sqrt(2 C_f C_r / (m (l_f C_f - l_r C_r)))`` with ``L = l_f + l_r``, the stiffness per tyre, and two
+    tyres per axle (Rajamani, Vehicle Dynamics and Control, Section 3.3).
+
+    Args:
+        vehicle: parameters of the car.
     """
     oversteer = vehicle.l_f * vehicle.C_f - vehicle.l_r * vehicle.C_r
     if oversteer <= 0.0:
@@ -332,23 +348,23 @@ def critical_speed(vehicle: VehicleParameters) -> float:
 
 
 class TaskParameters(NamedTuple):
-    """What is to be driven, and how often it is decided.
+    """The driving task: time step, lanes, target speed and lane change.
 
     Attributes:
         dt: time step of all controllers [s]; paper, Section VI (0.05 s).
         tau_p: horizon of the CTRA prediction [s]; paper, Section III-A.
-        lane_width: width of a lane [m]; spec of the cases (4 m).
+        lane_width: width of a lane [m]; specification of the cases (4 m).
         road_high: left edge of the road in the road frame [m].
-        road_end: path length at which the road ends, and with it the episode [m].
+        road_end: path length at which the road and the episode end [m].
         y_target: lateral position of the lane to keep [m].
-        target_speed: speed to drive where no slower vehicle precedes [m/s]; Case 1 (15 m/s).
-        time_headway: gap to keep over the speed [s], 0 for none: the paper's target speed is that of the preceding
-            vehicle, whatever the distance. 1.2 s is usual (ISO 15622 has at least 0.8 s).
-        standstill_gap: gap to keep at rest, bumper to bumper [m]; ours.
-        closing_time: time in which a gap that is too large or too small is to be closed [s]; ours.
+        target_speed: desired speed where no slower vehicle precedes [m/s]; Case 1 (15 m/s).
+        time_headway: desired time headway [s]. With 0 there is none: the target speed is then that of the preceding
+            vehicle at any distance, as in the paper. 1.2 s is usual (ISO 15622 requires at least 0.8 s).
+        standstill_gap: desired gap at rest, bumper to bumper [m]; ours.
+        closing_time: time constant with which an error of the gap is corrected [s]; ours.
         y_goal: lateral position of the lane to change to [m].
-        change_onset: when the lane change begins [s]; infinite for none.
-        change_duration: of the lane change [s]; ours.
+        change_onset: time at which the lane change begins [s]; infinite for none.
+        change_duration: duration of the lane change [s]; ours.
     """
 
     dt: Positive = 0.05
@@ -367,25 +383,25 @@ class TaskParameters(NamedTuple):
 
 
 class DegradationParameters(NamedTuple):
-    """One degradation of the automation (:mod:`core.faults`); all ours but the paper's two biases.
+    """One degradation of the automation (:mod:`core.faults`); all ours except the two biases of the paper.
 
     Attributes:
-        kind: place in :data:`core.faults.kinds.KINDS`, 0 for none.
-        act: where the compiled function of its kind is that acts on the command, 0 for none.
-        perceive: the same for the one that acts on perception.
-        advance: the same for the one that advances its memory.
-        in_unit_of_channel: whether the size is in the unit of its channel, or that per second.
-        acceleration: whether it acts on the acceleration command.
-        steering: whether it acts on the steering command.
-        onset: when it sets in [s]; paper, Eq. 17, 18.
-        ramp: time over which it grows to its full size [s]; paper, Eq. 17, 18.
-        duration: from the onset until it is gone again [s]; infinite for a permanent one.
-        period: of an intermittent one [s]; 0 for one that does not come and go.
-        duty: share of the period in which an intermittent one is there [-].
-        size: what the kind says, in its unit; paper, Eq. 17, 18.
+        kind: index in :data:`core.faults.kinds.KINDS`; 0 for no degradation.
+        act: address of the kind's compiled function that changes the command; 0 for none.
+        perceive: address of the kind's compiled function that changes the perception; 0 for none.
+        advance: address of the kind's compiled function that advances its memory; 0 for none.
+        in_unit_of_channel: whether the size is in the unit of its channel, or in that unit per second.
+        acceleration: whether the degradation acts on the acceleration command.
+        steering: whether the degradation acts on the steering command.
+        onset: time at which the degradation begins [s]; paper, Eq. 17, 18.
+        ramp: time over which the degradation grows to its full size [s]; paper, Eq. 17, 18.
+        duration: time from the onset to the end of the degradation [s]; infinite for a permanent one.
+        period: period of an intermittent degradation [s]; 0 for one that is not intermittent.
+        duty: share of each period during which an intermittent degradation acts [-].
+        size: size of the degradation; the kind defines its meaning and unit; paper, Eq. 17, 18.
         time_constant: correlation time of coloured noise [s].
-        frequency: of an oscillation [Hz].
-        seed: of noise.
+        frequency: frequency of an oscillation [Hz].
+        seed: seed of the noise.
     """
 
     kind: int = 0
@@ -407,16 +423,16 @@ class DegradationParameters(NamedTuple):
 
 
 class TrafficParameters(NamedTuple):
-    """What another vehicle is going to do (:mod:`core.world.traffic`); all ours.
+    """Plan of another vehicle (:mod:`core.world.traffic`); all ours.
 
     Attributes:
-        follows: whether it keeps its distance by the Intelligent Driver Model; else it holds its speed.
-        desired_speed: v_0 of that model [m/s].
-        brake_onset: when it begins to brake [s]; infinite for never.
-        deceleration: with which it then brakes to a stop [m/s^2].
-        change_onset: when it begins to move over to another lane [s]; infinite for never.
-        change_duration: how long that takes [s].
-        shift: how far it moves over, positive to the left [m].
+        follows: whether the vehicle follows by the Intelligent Driver Model; if not, it holds its speed.
+        desired_speed: v_0 of the Intelligent Driver Model [m/s].
+        brake_onset: time at which the vehicle begins to brake [s]; infinite for never.
+        deceleration: deceleration with which the vehicle then brakes to a stop [m/s^2].
+        change_onset: time at which the vehicle begins a lane change [s]; infinite for never.
+        change_duration: duration of the lane change [s].
+        shift: lateral displacement of the lane change, positive to the left [m].
     """
 
     follows: bool = False
@@ -429,14 +445,14 @@ class TrafficParameters(NamedTuple):
 
 
 class AuthorityParameters(NamedTuple):
-    """Choice of the fuzzy operators and of the authority law, by code.
+    """Choice of the fuzzy operators and of the authority law, and where degradations of the command act.
 
     Attributes:
         law: index in :data:`core.authority.laws.LAWS`; paper, Eq. 10.
         operators: index in :data:`core.authority.fuzzy.OPERATORS`; ours.
         fault_at: index in :data:`core.faults.command.PLACES`, where degradations of the command act; paper: command.
-        shared: whether the monitor perceives what the automation misperceives; ours.
-        strict: whether the second line of Eq. 10 holds for alpha < 1 alone, as printed.
+        shared: whether the monitor shares the automation's errors of perception; ours.
+        strict: whether the second line of Eq. 10 applies only for alpha < 1, as printed.
     """
 
     law: int = 0
@@ -447,11 +463,11 @@ class AuthorityParameters(NamedTuple):
 
 
 class SolverParameters(NamedTuple):
-    """Effort of the automation's solver.
+    """Iteration limits of the automation's solver.
 
     Attributes:
-        iterations: Gauss-Newton iterations per step; ours.
-        first_iterations: the same at the first step, from a cold start; ours.
+        iterations: largest number of Gauss-Newton iterations per step; ours.
+        first_iterations: largest number of Gauss-Newton iterations at the first step, a cold start; ours.
     """
 
     iterations: int = 3
@@ -459,25 +475,25 @@ class SolverParameters(NamedTuple):
 
 
 class Parameters(NamedTuple):
-    """Everything that one environment is set up with; the parts are documented in their classes.
+    """All parameters of one environment; the groups are documented in their classes.
 
     Attributes:
-        vehicle: the ego vehicle, as it drives.
-        model: the ego vehicle as controllers, person and risk assessment take it to be, with linear tyres.
+        vehicle: the ego vehicle as it drives.
+        model: the ego vehicle as controllers, person and risk assessment model it, with linear tyres.
         limits: limits of the commands.
-        automation: weights of the automation's predictive controller.
-        driver: weights of the driver's predictive controller; the paper's are the same.
+        automation: horizon and weights of the automation's predictive controller.
+        driver: horizon and weights of the driver's predictive controller; the paper uses those of the automation.
         safe_area: extent of the driving region.
-        lateral: lateral risk.
-        longitudinal: longitudinal risk.
+        lateral: parameters of the lateral risk.
+        longitudinal: parameters of the longitudinal risk.
         law: tolerances of the authority law.
-        lag: the driver's response.
-        internal_model: what the driver knows of it.
-        person: what is between the driver's eye and the command.
-        reward: weights of the reward.
-        task: lane, speed and time step.
-        authority: operators and law.
-        solver: effort of the automation's solver.
+        lag: neuromuscular lag of the driver.
+        internal_model: what the driver knows of this lag.
+        person: perception, attention and arm of a person at the wheel.
+        reward: terms and weights of the reward.
+        task: the driving task.
+        authority: fuzzy operators, authority law and place of the fault.
+        solver: iteration limits of the automation's solver.
     """
 
     vehicle: VehicleParameters = VehicleParameters()

@@ -1,8 +1,8 @@
-"""The records that the loop reads and writes: what each holds, and the structured types made of that.
+"""The records that the loop reads and writes: their fields, and the structured types built from them.
 
-A record is one entry of a structured array. The single environment has arrays of one entry, the vectorised one of
-many; compiled functions take a record and see its fields as attributes, as those of the classes here. The classes say
-names, units and shapes, for readers and for mypy; nobody makes an object of them.
+A record is one entry of a structured array. The single environment has arrays of one entry, the vectorised environment
+arrays of many. Compiled functions take a record and access its fields as attributes. The classes here give the names,
+units and shapes of the fields, for readers and for mypy. They are never instantiated.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ MAX_CONTROL = 10
 """Longest control horizon H_c [steps]."""
 
 MAX_DELAY = 21
-"""Time steps of the command that a delay can reach back to, the present one included."""
+"""Number of time steps kept for a delay, the present one included."""
 
 MAX_CHAIN = 20
-"""Vertices kept of a boundary of the safe area; shorter ones repeat their last vertex."""
+"""Number of vertices kept of each boundary of the safe area; a shorter boundary repeats its last vertex."""
 
 MAX_TERMS = 12
-"""Most terms of a reward."""
+"""Largest number of terms of a reward."""
 
 X, Y, HEADING, SPEED, ACCELERATION, YAW_RATE, BODY_LENGTH, BODY_WIDTH = range(8)
-"""Columns of the traffic array: Cartesian pose [m, rad], motion [m/s, m/s^2, rad/s], body [m]."""
+"""Columns of the traffic array: Cartesian pose [m, rad], motion [m/s, m/s^2, rad/s], body length and width [m]."""
 
 PRESENT, NEAR_S, NEAR_D, NEAR_SPEED, NEAR_ROW = range(5)
-"""Columns of a scene's neighbours: 1 if there is one, road-frame position [m], speed [m/s], traffic row."""
+"""Columns of a scene's neighbours: 1 if present, position (s, d) in the road frame [m], speed [m/s], traffic row."""
 
 FOLLOWER, LEADER, PRECEDING = range(3)
-"""Order of the neighbours in every array: follower, leader, preceding, as the weights in Eq. 7."""
+"""Order of the neighbours in every array: follower, leader, preceding vehicle, as the weights in Eq. 7."""
 
 Int32: TypeAlias = Annotated[int, np.int32]
 Vector2: TypeAlias = Annotated[np.ndarray, (2,)]
@@ -46,16 +46,19 @@ Chain: TypeAlias = Annotated[np.ndarray, (MAX_CHAIN, 2)]
 def record_dtype(fields_of: type) -> np.dtype:
     """Aligned structured type with the fields of a class, nested classes included.
 
-    A field is a number (``float``, ``int``, ``bool``, or ``Annotated[int, dtype]``), an array
-    (``Annotated[np.ndarray, shape]``, of floats unless ``Annotated[np.ndarray, shape, dtype]``), a class of this kind,
-    or a structured type (``Annotated[Any, dtype]``).
+    A field is one of the following: a number (``float``, ``int``, ``bool`` or ``Annotated[int, dtype]``); an array of
+    floats (``Annotated[np.ndarray, shape]``) or of another type (``Annotated[np.ndarray, shape, dtype]``); another
+    class of fields; or a structured type (``Annotated[Any, dtype]``).
+
+    Args:
+        fields_of: class whose annotations name the fields and their types.
     """
     hints = get_type_hints(fields_of, include_extras=True)
     return np.dtype([(name, *_field(hint)) for name, hint in hints.items()], align=True)
 
 
 def _field(hint: Any) -> tuple[Any, ...]:
-    """Type of a field, and its shape where it is an array."""
+    """Type of a field, followed by its shape if the field is an array."""
     if get_origin(hint) is not Annotated:
         return (record_dtype(hint) if hasattr(hint, "__annotations__") else np.dtype(hint),)
     kind, first, *more = get_args(hint)
@@ -65,12 +68,16 @@ def _field(hint: Any) -> tuple[Any, ...]:
 
 
 def pack(parameters: NamedTuple) -> np.ndarray:
-    """Record that holds a (nested) named tuple's values, as a 0-d array."""
+    """Record with the values of a named tuple, nested ones included, as a 0-d array.
+
+    Args:
+        parameters: named tuple, such as :class:`core.parameters.Parameters`.
+    """
     return np.array(_plain(parameters), dtype=record_dtype(type(parameters)))
 
 
 def _plain(value: object) -> object:
-    """Named tuples as plain nested tuples, which NumPy assigns to a record by position."""
+    """Convert named tuples to plain nested tuples, which NumPy assigns to a record by position."""
     return tuple(_plain(item) for item in value) if isinstance(value, tuple) else value
 
 
@@ -80,7 +87,7 @@ class SafeArea:
     Attributes:
         lower: lower (right) boundary, vertices (s, d) [m].
         upper: upper (left) boundary, vertices (s, d) [m].
-        start, end: s where the area begins and ends [m].
+        start, end: path length s at which the area begins and ends [m].
         outcome: safe_area.REACHED or safe_area.BLOCKED.
     """
 
@@ -92,22 +99,23 @@ class SafeArea:
 
 
 class Scene:
-    """What is perceived at one time step, of the road and of the automation; the fault is not in it.
+    """What is perceived of the road and of the automation at one time step. It does not contain the fault.
 
     Attributes:
         k: time step.
         t: time [s].
-        state: ego [x, y, psi, v_x, v_y, r], Cartesian frame.
-        z: ego [s, y, psi, v_x, v_y, r], road frame.
-        kappa: curvature at the stages of the horizon [1/m].
+        state: ego [x, y, psi, v_x, v_y, r] in the Cartesian frame [m, rad, m/s, rad/s].
+        z: ego [s, y, psi, v_x, v_y, r] in the road frame [m, rad, m/s, rad/s].
+        kappa: curvature of the road at the stages of the horizon [1/m].
         y_target: lateral position to track [m].
         v_target: speed to track [m/s].
         changing: whether a lane change is under way.
-        felt: the automation's actual command of the step before, felt at wheel and pedal [m/s^2, rad].
-        displayed: alpha_a of the step before, as the driver sees it on display [-].
-        neighbours: rows of follower, leader, preceding.
-        bodies: half the lengths of the ego and of the preceding vehicle, which their distance has to be less [m].
-        region: driving region: start, end, low, high [m].
+        felt: the automation's actual command of the previous step, felt at wheel and pedal [m/s^2, rad].
+        displayed: alpha_a of the previous step, as displayed to the driver [-].
+        neighbours: rows of the follower, the leader and the preceding vehicle, columns PRESENT to NEAR_ROW.
+        bodies: half the sum of the lengths of the ego and of the preceding vehicle [m]: the distance between their
+            centres minus their gap.
+        region: driving region [start, end, low, high] in the road frame [m].
         area: the safe area C.
     """
 
@@ -128,25 +136,25 @@ class Scene:
 
 
 class Signals:
-    """Every signal of one time step.
+    """All signals of one time step. Every command is ``[a, delta]`` [m/s^2, rad].
 
     Attributes:
-        u_a_des: the automation's desired command [m/s^2, rad].
-        u_a_f: the same, degraded.
-        fault: what the degradations add to the command, wherever they act.
-        misperception: of the automation: lane offset [m], 1 where it misses its lead.
-        prediction: xi = [x, y, psi, v, a, r] after tau_p, Cartesian frame.
-        prediction_road: its (s, d) [m].
-        predicted_neighbours: after tau_p: 1 if there is one, s [m], speed [m/s].
+        u_a_des: the automation's desired command.
+        u_a_f: the automation's desired command after degradation.
+        fault: change of the command that the degradations cause, wherever they act.
+        misperception: errors of the automation's perception: lane offset [m]; 1 if the preceding vehicle is missed.
+        prediction: predicted state of the ego after tau_p in the Cartesian frame, xi = [x, y, psi, v, a, r].
+        prediction_road: predicted position (s, d) of the ego in the road frame [m].
+        predicted_neighbours: rows [1 if present, s [m], speed [m/s]] of the neighbours after tau_p.
         r_x, r_y: longitudinal and lateral risk [-].
         alpha_a: authority of the automation [-].
         u_a_act: the automation's actual command.
         u_h_des: the driver's desired command.
         u_h_act: the driver's actual command.
         u: command that drives the vehicle.
-        status: control.automation.CONVERGED, ITERATION_LIMIT or FAILED.
-        iterations: Gauss-Newton iterations.
-        residual: projected gradient.
+        status: outcome of the automation's solver: control.automation.CONVERGED, ITERATION_LIMIT or FAILED.
+        iterations: number of Gauss-Newton iterations.
+        residual: projected gradient at the solution [-].
     """
 
     u_a_des: Vector2
@@ -172,11 +180,11 @@ class FaultMemory:
     """What a degradation carries from one time step to the next.
 
     Attributes:
-        acting: whether it acted in the step before.
-        kept: the command at the moment it set in [m/s^2, rad].
-        noise: state of coloured noise, in units of its standard deviation.
-        last: its last output.
-        past: commands of the last steps, step k in row k % MAX_DELAY.
+        acting: whether the degradation acted in the previous step.
+        kept: the command at the onset of the degradation [m/s^2, rad].
+        noise: state of the coloured noise, in units of its standard deviation [-].
+        last: last output of the degradation [m/s^2, rad].
+        past: commands of the last steps [m/s^2, rad]; that of step k is in row k % MAX_DELAY.
     """
 
     acting: bool
@@ -190,9 +198,9 @@ class AutomationMemory:
     """What the automation carries from one time step to the next.
 
     Attributes:
-        U: command sequence, for the warm start.
-        u_a_des: last feasible command.
-        failures: steps at which the solver failed.
+        U: command sequence for the warm start [m/s^2, rad].
+        u_a_des: last feasible command [m/s^2, rad].
+        failures: number of steps at which the solver failed.
     """
 
     U: Annotated[np.ndarray, (MAX_CONTROL, 2)]
@@ -204,12 +212,12 @@ class Memory:
     """What the rest of the loop carries from one time step to the next.
 
     Attributes:
-        u_h_act: state of the driver's lag.
-        u_h_des: the driver's last desired command.
-        u: last command of the vehicle.
+        u_h_act: state of the driver's lag [m/s^2, rad].
+        u_h_des: the driver's last desired command [m/s^2, rad].
+        u: last command of the vehicle [m/s^2, rad].
         in_lane: whether the ego's centre is in the lane to keep.
-        lane_departures: times that it has left the lane.
-        driver_failures: steps at which the kernel's driver's solver failed.
+        lane_departures: number of times that the ego's centre has left the lane to keep.
+        driver_failures: number of steps at which the solver of the kernel's driver failed.
     """
 
     u_h_act: Vector2
@@ -224,12 +232,13 @@ class PersonMemory:
     """What a person at the wheel carries from one time step to the next.
 
     Attributes:
-        past: states of the last steps, that of step k in row k % MAX_DELAY.
-        commands: commands that drove the car in them.
-        error: of perception: lateral, heading, speed; of the arm; in units of their deviation.
-        engaged: whether the person drives; else the hands rest.
-        noticed: when something was noticed [s]; infinite before.
-        reason: what it was, index in person.REASONS.
+        past: ego states of the last steps in the road frame; that of step k is in row k % MAX_DELAY.
+        commands: commands that drove the vehicle in these steps [m/s^2, rad].
+        error: errors of perceived lateral position, heading and speed, and of the arm, in units of their standard
+            deviation [-].
+        engaged: whether the person drives; if not, the hands rest.
+        noticed: time at which the person noticed something [s]; infinite before.
+        reason: what the person noticed, index in person.REASONS.
     """
 
     past: Annotated[np.ndarray, (MAX_DELAY, 6)]
@@ -241,15 +250,15 @@ class PersonMemory:
 
 
 class Transition:
-    """What a step led from and to, as the reward's terms see it beside scene and signals.
+    """What the reward's terms need of a step beside the scene and the signals.
 
     Attributes:
         previous_s: path length before the step [m].
-        last_a: acceleration command of the step before [m/s^2].
+        last_a: acceleration command of the previous step [m/s^2].
         crashed: whether the ego has collided.
-        on_road: whether the ego's centre is between the road's edges, in a state that is finite.
+        on_road: whether the ego's state is finite and its centre lies between the edges of the road.
         failed: whether the step ended in a collision or off the road.
-        terms: of the reward, unweighted, in the order that the settings name them.
+        terms: unweighted terms of the reward [-], in the order of the settings.
     """
 
     previous_s: float

@@ -1,7 +1,7 @@
-"""The highway-env-derived environments, such as ``TwoLaneEnv``: one class a scenario (:mod:`envs.scenarios`).
+"""The environments derived from highway-env, such as ``TwoLaneEnv``: one class per scenario (:mod:`envs.scenarios`).
 
-They are imported when they are first asked for: the vectorised environment needs the settings alone, and
-highway-env takes longer to import than everything else.
+They are imported on first use. The vectorised environment needs only the settings, and importing highway-env takes
+longer than importing everything else.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 
 def __getattr__(name: str) -> Any:
-    """``SharedControlEnv``, or the class of a scenario."""
+    """``SharedControlEnv``, or the environment class of a scenario."""
     if name == "SharedControlEnv":
         return import_module("shared_control_env.envs.shared_control").SharedControlEnv
     if name.endswith("Env"):

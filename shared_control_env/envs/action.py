@@ -14,7 +14,14 @@ from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, Clippi
 
 
 class SlotAction(ActionType):
-    """Action of the bare environment, a dict of both slots."""
+    """Action of the bare environment: a dict of both slots.
+
+    Args:
+        env: the environment.
+
+    Attributes:
+        clipping: counts the values beyond their bounds.
+    """
 
     def __init__(self, env: Any) -> None:
         super().__init__(env)
@@ -26,17 +33,17 @@ class SlotAction(ActionType):
 
     @property
     def vehicle_class(self) -> type[EgoVehicle]:
-        """Class of the vehicle that carries the action out."""
+        """Class of the vehicle that executes the action."""
         return EgoVehicle
 
     def decode(self, action: Any) -> tuple[np.ndarray, float]:
-        """The driver's desired command and the automation's authority.
+        """Split an action into the driver's desired command and the automation's authority.
 
         Args:
             action: dict with the keys ``driver`` and ``authority``.
 
         Returns:
-            ``u_h,des = [a, delta]`` over its limits, in [-1, 1], shape (2,), and alpha_a.
+            u_h,des, ``[a, delta]`` as shares of their limits in [-1, 1], shape (2,) [-]; and alpha_a [-].
 
         Raises:
             ValueError: if a slot is missing, unknown, of the wrong shape or not finite.

@@ -1,4 +1,4 @@
-"""The library of degradations: each a kind of :mod:`core.faults` with published ranges to draw it from."""
+"""The library of degradations: each is a kind of :mod:`core.faults` with published ranges to draw it from."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ Range = tuple[float, float]
 
 
 class Degradation(NamedTuple):
-    """A degradation to draw: uniform within its ranges, one channel of those named, with one seed for its noise.
+    """A degradation to draw. All numbers are uniform within their ranges, and one of the named channels is chosen.
 
     Attributes:
         description: what goes wrong.
-        kind: of :data:`core.faults.kinds.KINDS`.
-        channels: candidates; the kinds that concern perception have no channel.
-        size: range of the size, None where the kind has none. In the channel's limit (5 m/s^2, 30 deg) for those
-            with ``of_limit``, else in the unit of the kind.
+        kind: name of the kind, a key of :data:`core.faults.kinds.KINDS`.
+        channels: channels to choose from; kinds that concern perception have no channel.
+        size: range of the size; None where the kind has no size. With ``of_limit`` it is a share of the channel's
+            limit (5 m/s^2, 30 deg), else it is in the unit of the kind.
         of_limit: whether the size is a share of the channel's limit.
-        signed: whether the size is of either sign.
-        onset, ramp: ranges [s].
-        duration: range [s]; None for a permanent one.
-        period: range of one that comes and goes [s].
+        signed: whether the size can have either sign.
+        onset: range of the time of onset [s].
+        ramp: range of the duration of the ramp [s].
+        duration: range of the duration [s]; None for a permanent degradation.
+        period: range of the period of an intermittent degradation [s].
     """
 
     description: str
@@ -82,21 +83,21 @@ DEGRADATIONS: dict[str, Degradation | None] = {
     "missed_lead": Degradation("the vehicle that precedes is not perceived", "missed_lead", ("acceleration",)),
     "complete_failure": Degradation("no command at all, for good", "drop_out", ("both",)),
 }
-"""The library by name. The sizes run from what a driver hardly notices to what leaves the lane within a second."""
+"""The library by name. The sizes range from hardly noticeable to a lane departure within a second."""
 
 STANDARD = tuple(DEGRADATIONS)
-"""Names of the package's own; those that others add come after them."""
+"""Names of the degradations that the package defines; user-defined degradations come after them."""
 
 
 def add_degradation(name: str, degradation: Degradation) -> None:
-    """Add a degradation, which settings and suites may name from then on; no scenario draws it by itself.
+    """Add a degradation, so that settings and suites can name it. The registered scenarios do not draw it.
 
     Args:
-        name: in ``config["degradations"]`` and in suites.
-        degradation: its kind is one of :data:`core.faults.kinds.KINDS`.
+        name: name for ``config["degradations"]`` and for suites.
+        degradation: the degradation; its kind is a key of :data:`core.faults.kinds.KINDS`.
 
     Raises:
-        ValueError: if the name is taken, or the kind unknown.
+        ValueError: if the name is taken, or the kind is unknown.
     """
     if name in DEGRADATIONS:
         raise ValueError(f"degradation {name!r} is there already")
@@ -106,15 +107,15 @@ def add_degradation(name: str, degradation: Degradation) -> None:
 
 
 def draw_degradation(name: str, limits: Limits, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Settings of the faults that a named degradation consists of, its numbers drawn.
+    """Draw the fault settings of a named degradation.
 
     Args:
         name: key of :data:`DEGRADATIONS`.
-        limits: of the commands.
-        rng: generator; always asked for the same number of draws.
+        limits: limits of the commands.
+        rng: generator; the number of draws is the same for every degradation.
 
     Returns:
-        Entries for ``config["faults"]``; none for ``"none"``.
+        Entries for ``config["faults"]``; an empty list for ``"none"``.
     """
     which, size, sign, onset, ramp, duration, period = rng.random(7).tolist()
     seed = int(rng.integers(2**31))

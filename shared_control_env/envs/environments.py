@@ -1,4 +1,4 @@
-"""The bare environments of the scenarios (:mod:`envs.scenarios`)."""
+"""The environment classes of the scenarios (:mod:`envs.scenarios`), without wrappers."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ from shared_control_env.envs.shared_control import SharedControlEnv
 
 
 class ScenarioEnv(SharedControlEnv):
-    """Environment of one scenario: its settings are the defaults.
+    """Environment of one scenario. The settings of the scenario are the defaults.
 
     Attributes:
-        scenario: which.
+        scenario: the scenario.
     """
 
     scenario: ClassVar[Scenario]
 
     @classmethod
     def default_config(cls) -> dict[str, Any]:
-        """Settings of the scenario."""
+        """All settings, with the values of the scenario."""
         return merge(super().default_config(), cls.scenario.settings)
 
 
 @cache
 def environment_class(name: str) -> type[ScenarioEnv]:
-    """Class of the bare environment of a scenario, such as ``TwoLaneEnv`` of ``two_lane``.
+    """Class of the bare environment of a scenario, such as ``TwoLaneEnv`` for ``two_lane``.
 
     Args:
         name: key of :data:`scenarios.SCENARIOS`.
@@ -39,7 +39,7 @@ def environment_class(name: str) -> type[ScenarioEnv]:
 
 
 def __getattr__(name: str) -> type[ScenarioEnv]:
-    """A scenario's class by its own name, as pickles look it up."""
+    """The class of a scenario by its class name; pickle looks classes up in this way."""
     for scenario in SCENARIOS:
         if name.endswith("Env") and environment_class(scenario).__name__ == name:
             return environment_class(scenario)

@@ -1,4 +1,4 @@
-"""What is random about an episode, drawn into settings that say it all."""
+"""Random draws at the start of an episode; the result is settings without any randomness left."""
 
 from __future__ import annotations
 
@@ -15,27 +15,32 @@ from shared_control_env.envs.settings.changes import at
 
 
 def is_random(settings: Settings) -> bool:
-    """Whether anything is drawn at the start of an episode."""
+    """Whether anything is drawn at the start of an episode.
+
+    Args:
+        settings: settings of the environment.
+    """
     noisy = any(KINDS[fault.kind].draws and fault.seed is None for fault in settings.faults)
     person = settings.person.active and settings.person.seed is None
     return bool(settings.randomise or settings.degradations or noisy or person)
 
 
 def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
-    """Settings of one episode: ``randomise`` drawn in its order, one of ``degradations``, seeds of noise, who drives.
+    """Draw the settings of one episode.
 
-    Where a person drives, what concerns the driver is drawn from a generator of its own, so that a seed gives the same
-    road, traffic and degradations whoever drives.
+    The draws are the entries of ``randomise`` in their order, one of ``degradations``, the seeds of noise, and the
+    seed of the person. If a person drives, the settings that concern the driver and the seed of the person come from a
+    separate generator. A seed then gives the same road, traffic and degradations for every driver.
 
     Args:
-        settings: of the environment.
-        rng: the environment's generator; not touched where nothing is random.
+        settings: settings of the environment.
+        rng: generator of the environment; unused if nothing is random.
 
     Returns:
-        Settings in which nothing is left to draw; the drawn degradation comes after the faults that are given.
+        Settings with all values drawn. The drawn degradation comes after the faults in ``config["faults"]``.
 
     Raises:
-        ValueError: if a drawn value is out of its setting's range.
+        ValueError: if a drawn value is outside the range of its setting.
     """
     if not is_random(settings):
         return settings
@@ -49,7 +54,7 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
         drawn = draw_degradation(name, Limits(**config["limits"]), rng)
     for fault in config["faults"]:
         if fault["seed"] is None:
-            seed = int(rng.integers(2**31))  # for every kind, so that the next draws do not depend on this one's kind
+            seed = int(rng.integers(2**31))  # drawn for every kind, so that later draws do not depend on the kind
             if KINDS[fault["kind"]].draws:
                 fault["seed"] = seed
     if settings.has_person and settings.person.seed is None:
@@ -64,7 +69,7 @@ def _concerns_driver(entry: RandomSettings) -> bool:
 
 
 def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.Generator) -> None:
-    """Draw one setting of a plain dict; whole numbers, both ends included, where it is a whole number."""
+    """Draw one setting of a plain dict in place. An integer setting gets an integer, both ends included."""
     *path, last = entry.setting.split(".")
     section = at(config, tuple(path))
     place: Any = int(last) if isinstance(section, list) else last
@@ -76,7 +81,7 @@ def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.
         section[place] = entry.median * exp(entry.spread * deviation)
         return
     assert entry.low is not None
-    assert entry.high is not None  # as checked with the settings
+    assert entry.high is not None  # the check of the settings ensures this
     if isinstance(section[place], int):
         section[place] = int(rng.integers(int(entry.low), int(entry.high), endpoint=True))
     else:

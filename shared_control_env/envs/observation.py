@@ -1,4 +1,4 @@
-"""An observation of the core as a highway-env observation type."""
+"""Adapter from an observation of the core to a highway-env observation type."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from shared_control_env.envs.outputs import observation_space
 
 
 class CoreObservation(ObservationType):
-    """What the core wrote of the present scene.
+    """The observation that the core wrote for the present scene.
 
     Args:
-        env: the environment, whose ``observation`` it gives.
-        observation: which it is.
+        env: the environment; its attribute ``observation`` holds the last observation.
+        observation: the observation type of the core.
     """
 
     def __init__(self, env: Any, observation: Observation) -> None:
@@ -29,5 +29,5 @@ class CoreObservation(ObservationType):
         return observation_space(self.observation)
 
     def observe(self) -> np.ndarray:
-        """Observation of the present scene, a new array."""
+        """Observation of the present scene as a new array."""
         return self.env.observation.copy()

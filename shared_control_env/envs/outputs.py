@@ -1,4 +1,4 @@
-"""What a step of the kernel gives: the arrays that it writes, and the space of its observations."""
+"""Outputs of a step of the kernel: the arrays that it writes, and the observation space."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def observation_space(observation: Observation) -> spaces.Box:
     """Space of an observation: a Box of shape (n,) in [-1, 1].
 
     Args:
-        observation: which.
+        observation: the observation type.
     """
     return spaces.Box(-1.0, 1.0, shape=(observation.size,), dtype=np.float32)
 
@@ -26,9 +26,9 @@ def new_outputs(n: int, features: int, allocate: Callable[..., np.ndarray] = np.
     """New arrays for one step of n environments.
 
     Args:
-        n: how many.
-        features: of an observation.
-        allocate: ``numpy.zeros``, or ``numpy.empty`` where every environment writes.
+        n: number of environments.
+        features: number of features of an observation.
+        allocate: ``numpy.zeros``, or ``numpy.empty`` if every environment writes its entries.
     """
     return Outputs(
         observations=allocate((n, features), np.float32),

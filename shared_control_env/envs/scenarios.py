@@ -1,4 +1,4 @@
-"""The registered scenarios as settings: the paper's two cases, and eight that are drawn within ranges."""
+"""The registered scenarios as settings: the paper's two cases, and eight scenarios drawn within ranges."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class Scenario(NamedTuple):
     """A registered scenario.
 
     Attributes:
-        id: with Gymnasium.
-        description: in a line.
+        id: Gymnasium id.
+        description: description in one line.
         settings: changes to the default settings.
     """
 
@@ -34,13 +34,13 @@ DRAWN_V0 = (
     *("white_noise", "coloured_noise", "oscillation", "drop_out", "intermittent", "sign_error"),
     *("lane_offset", "missed_lead", "complete_failure"),
 )
-"""Degradations that the drawn scenarios of version 0 draw from; what is added to the library is not among them."""
+"""Degradations that the drawn scenarios of version 0 draw from. Degradations added to the library are not included."""
 
 _CURVATURES = [sign / radius for radius in (60.0, 80.0, 120.0, 200.0) for sign in (1.0, -1.0)]
-"""Curves to the left and to the right [1/m]."""
+"""Curvatures of the drawn curves, to the left and to the right [1/m]."""
 
 _BEND_ROAD = {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0, "curvature": 1.0 / 60.0}]}
-"""A straight, then an arc whose curvature is drawn."""
+"""A straight segment, then an arc whose curvature is drawn."""
 
 TWO_LANE = Scenario(
     id="SharedControl/TwoLane-v0",
@@ -209,7 +209,7 @@ LEAD_BRAKING = Scenario(
 )
 
 _DENSE = [(0, 22.0), (0, 44.0), (0, 66.0), (0, -20.0), (1, 8.0), (1, 30.0), (1, 52.0), (1, -14.0)]
-"""Lane and position [m] of the vehicles of dense traffic, before 4 m to either side are drawn."""
+"""Lane and nominal position [m] of each vehicle of dense traffic; positions are drawn within 4 m of these."""
 
 DENSE_TRAFFIC = Scenario(
     id="SharedControl/DenseTraffic-v0",
@@ -266,18 +266,18 @@ SCENARIOS: dict[str, Scenario] = {
     "dense_traffic": DENSE_TRAFFIC,
     "curve_with_lead": CURVE_WITH_LEAD,
 }
-"""All scenarios by the name that the benchmark and the entry points know them by."""
+"""All scenarios by the name that the benchmark and the entry points use."""
 
 STANDARD = tuple(SCENARIOS)
-"""Names of the package's own; those that others add come after them."""
+"""Names of the scenarios that the package defines; user-defined scenarios come after them."""
 
 
 def add_scenario(name: str, scenario: Scenario) -> None:
-    """Add a scenario under its own name: for suites of the benchmark, and with Gymnasium under its id.
+    """Add a scenario: under its name for suites of the benchmark, and under its id with Gymnasium.
 
     Args:
-        name: for the benchmark, such as ``roundabout``.
-        scenario: its settings are checked when an environment is made of them.
+        name: name for the benchmark, such as ``roundabout``.
+        scenario: the scenario; its settings are checked when an environment is made.
 
     Raises:
         ValueError: if the name or the id is taken.
@@ -291,7 +291,9 @@ def add_scenario(name: str, scenario: Scenario) -> None:
 
 
 def register(name: str) -> None:
-    """Register a scenario's id with Gymnasium, with the limiter applied: what is left of the action is the driver's.
+    """Register the id of a scenario with Gymnasium.
+
+    The authority limiter is applied, so the action of the registered environment is the driver's command.
 
     Args:
         name: key of :data:`SCENARIOS`.

@@ -1,4 +1,4 @@
-"""Seeds as users give them."""
+"""The check of seeds that users give."""
 
 from __future__ import annotations
 
@@ -7,10 +7,17 @@ from typing import Any
 
 
 def checked_seed(seed: Any, what: str = "seed") -> int | None:
-    """A seed as a Python integer; NumPy's integers and arrays without dimensions are such too.
+    """Check a seed and convert it to a Python integer. NumPy integers and 0-d integer arrays are accepted.
+
+    Args:
+        seed: the seed, or None.
+        what: name of the seed for the error message.
+
+    Returns:
+        The seed, or None if none is given.
 
     Raises:
-        ValueError: if it is neither None nor an integer from 0 on.
+        ValueError: if the seed is neither None nor a non-negative integer.
     """
     if seed is None:
         return None

@@ -37,33 +37,42 @@ from shared_control_env.envs.starts import Sizes, empty_batch, empty_starts, ref
 class SharedControlEnv(HighwayEnv):
     """Human-machine shared control of one car whose automation degrades.
 
-    A step runs the signals of one time step k (:mod:`core.loop`): the automation's desired command u_a,des and its
-    degraded form u_a,f are known before it; the action brings the driver's u_h,des and the authority alpha_a; law,
-    driver lag and sum follow; the vehicle moves to k + 1, where the next scene is perceived and planned for.
+    A step covers one time step k (:mod:`core.loop`). The automation's desired command u_a,des and its degraded form
+    u_a,f are known before the step. The action provides the driver's desired command u_h,des and the authority
+    alpha_a. The authority law, the driver lag and the sum of the commands follow. The vehicle then moves to time step
+    k + 1, where the automation perceives the next scene and plans for it.
 
-    The environment is a batch of one in the kernel that steps many: one compiled call a step. highway-env's vehicles
-    are views of its arrays. Where Python has to come in between (an automation of one's own, vehicles of another class,
-    more than eight of them in the driving region, a recorder of every simulation step), the same calls of the loop are
-    made one after the other.
+    The environment is a batch of size one in the kernel of the vectorised environment. A step is one compiled call,
+    and highway-env's vehicles are views of the kernel's arrays. In some cases Python code has to run within a step: a
+    user-defined automation, vehicles of another class, more than eight vehicles in the driving region, or a recorder
+    of every simulation step. In these cases the parts of the loop are called one after the other from Python.
 
     The Cartesian frame is ISO 8855: x forward, y to the left, angles and steering positive to the left, as in
-    the paper. highway-env's formulas hold in it unchanged; only its pictures, which draw y downwards, are
-    flipped by the viewer.
+    the paper. highway-env's formulas hold unchanged in this frame. highway-env draws y downwards, so the viewer flips
+    its pictures.
 
-    The bare environment's action has both slots open (:class:`SlotAction`); the wrappers ``AuthorityLimiter`` and
+    The action of the bare environment has both slots open (:class:`SlotAction`). The wrappers ``AuthorityLimiter`` and
     ``DriverModel`` bind them.
 
     A subclass may override ``_reward(action)``, ``_rewards(action)``, ``_is_terminated()``, ``_is_truncated()`` and
-    ``_info(observation, action)``, as those of highway-env.
+    ``_info(observation, action)``, as in highway-env.
+
+    Args:
+        config: changes to the default settings; None for no changes.
+        render_mode: ``human``, ``rgb_array`` or None.
+
+    Raises:
+        ValueError: for wrong settings or an unknown render mode.
 
     Attributes:
-        config: settings of the next episode as a plain dict. What is assigned to it counts from the next reset on, as
-            with highway-env, and is checked there.
-        settings: the same, checked.
-        episode: settings of the present episode, with all that is random drawn.
+        config: settings of the next episode as a plain dict. Assigned values are checked at the next reset and take
+            effect from there, as in highway-env.
+        settings: the same settings, checked.
+        episode: settings of the present episode, with all random values drawn.
         command_limits: largest acceleration and steering [m/s^2, rad], shape (2,).
         observation: the last observation.
-        noted: record of :data:`info.INFO` of the last step, or reset.
+        noted: record of :data:`info.INFO` of the last step or reset.
+        viewer: the viewer; None before the first picture.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
@@ -71,7 +80,7 @@ class SharedControlEnv(HighwayEnv):
     def __init__(self, config: dict[str, Any] | None = None, render_mode: str | None = None) -> None:
         if render_mode is not None and render_mode not in self.metadata["render_modes"]:
             raise ValueError(f"render_mode = {render_mode!r} must be one of {self.metadata['render_modes']} or None")
-        # highway-env updates metadata, which is the class's own dict, at every reset.
+        # highway-env updates metadata at every reset. The copy keeps the dict of the class unchanged.
         self.metadata = dict(type(self).metadata)
         self.noted = np.zeros((), INFO)
         self.viewer: SharedControlViewer | None = None
@@ -92,12 +101,15 @@ class SharedControlEnv(HighwayEnv):
         return configuration.plain(configuration.Settings())
 
     def configure(self, config: dict[str, Any] | None) -> None:
-        """Merge changes into the config, nested dicts included, and check the whole; they act from the next reset on.
+        """Merge changes into the config and check the result. The changes take effect at the next reset.
 
-        What the changes name is no longer drawn (``config["randomise"]``).
+        Nested dicts are merged. Settings that the changes name are removed from ``config["randomise"]``.
+
+        Args:
+            config: changes to the settings; None for no changes.
 
         Raises:
-            ValueError: naming the key and the nearest valid one, or the field, its value and its range.
+            ValueError: for an unknown key, with the nearest valid key; or for a wrong value, with its range.
         """
         adopted = self.config if self._adopted is None else self._adopted
         assigned = configuration.difference(adopted, self.config)
@@ -113,17 +125,17 @@ class SharedControlEnv(HighwayEnv):
         self.config, self._adopted = configuration.plain(settings), configuration.plain(settings)
 
     def _check_video_speed(self, settings: configuration.Settings) -> None:
-        """Refuse another frame rate where whoever records pictures was told one and cannot be told another."""
+        """Raise ValueError if the frame rate changes although a video recorder may already use the old one."""
         told = self._adopted is not None and self.render_mode == "rgb_array" and self._record_video_wrapper is None
         if told and settings.policy_frequency != self.settings.policy_frequency:
             raise ValueError(
                 f"config['policy_frequency'] = {settings.policy_frequency} Hz: pictures of this environment are taken "
-                f"at {self.settings.policy_frequency} Hz, which a video's recorder cannot be told to change; make a "
-                "new environment, or hand the recorder to set_record_video_wrapper()"
+                f"at {self.settings.policy_frequency} Hz, and a video recorder does not notice a change; make a "
+                "new environment, or pass the recorder to set_record_video_wrapper()"
             )
 
     def _check_observation(self, settings: configuration.Settings) -> None:
-        """Refuse another observation than the spaces were made for."""
+        """Raise ValueError if the observation type differs from the one that the spaces were made for."""
         if self._adopted is not None and settings.observation != self.settings.observation:
             raise ValueError(
                 f"config['observation']['type'] = {settings.observation.type!r}: the spaces of this environment are "
@@ -131,7 +143,7 @@ class SharedControlEnv(HighwayEnv):
             )
 
     def define_spaces(self) -> None:
-        """Build action and observation types once: new spaces would forget the user's seed."""
+        """Build action and observation types once, because new spaces would lose the seed that a user gave them."""
         if self.action_space is None:
             self._observation = OBSERVATIONS[self.settings.observation.type]
             self.observation_type = CoreObservation(self, self._observation)
@@ -140,7 +152,11 @@ class SharedControlEnv(HighwayEnv):
             self.action_space = self.action_type.space()
 
     def update_metadata(self, video_real_time_ratio: float = 1.0) -> None:
-        """Frame rate at which videos run at the speed of the drive: one frame a decision, or a simulation step."""
+        """Set the frame rate of videos to one frame per decision, or per simulation step with a recorder set.
+
+        Args:
+            video_real_time_ratio: playback speed relative to real time [-].
+        """
         frequency = self.settings.policy_frequency
         if self._record_video_wrapper is not None:
             frequency = self.settings.simulation_frequency
@@ -149,9 +165,9 @@ class SharedControlEnv(HighwayEnv):
 
     @property
     def automation(self) -> Planner:
-        """Who decides u_a,des: the predictive controller of Eq. 12-13, or another :class:`Planner` put here.
+        """The automation that decides u_a,des: the predictive controller of Eq. 12-13, or an assigned :class:`Planner`.
 
-        One that is put here stays over resets, which call its ``reset()``.
+        An assigned automation is kept over resets; each reset calls its ``reset()``.
         """
         return self._automation
 
@@ -167,11 +183,11 @@ class SharedControlEnv(HighwayEnv):
         """Begin an episode.
 
         Args:
-            seed: of the environment's generator.
+            seed: seed of the environment's generator; None to let the generator continue.
             options: ``{"config": {...}}`` changes settings from this episode on, as in highway-env.
 
         Returns:
-            Observation and info. The signals in info are those planned for k = 0; nothing is applied yet.
+            Observation and info. The signals in info are those planned for k = 0; no command has been applied yet.
 
         Raises:
             ValueError: for unknown options or wrong settings.
@@ -199,7 +215,7 @@ class SharedControlEnv(HighwayEnv):
         return self.observation.copy(), info
 
     def _reset(self) -> None:
-        """Draw the episode; make road, vehicles and controllers from its settings."""
+        """Draw the settings of the episode, and create road, vehicles and controllers from them."""
         settings = self.episode = draw_episode(self.settings, self.np_random)
         start = start_of(settings)
         self._batch = empty_batch(1, Sizes(len(start.faults), len(start.line), len(start.traffic)))
@@ -236,7 +252,7 @@ class SharedControlEnv(HighwayEnv):
             self.road.vehicles.append(vehicle)
 
     def _bind(self) -> None:
-        """Have the vehicles' arrays be those of the batch: after a reset, a copy, or when there are others."""
+        """Make the arrays of the vehicles views of the batch. Needed after a reset, a copy, or a change of vehicles."""
         ego, others = self.vehicle, self.road.vehicles[1:]
         batch = self._batch
         states, traffic = np.zeros((1, 6)), np.zeros((1, len(others), 8))
@@ -259,10 +275,10 @@ class SharedControlEnv(HighwayEnv):
         self._load()
 
     def _load(self) -> None:
-        """Have all compiled that a step runs, and say how it runs."""
+        """Set up the step, and load or compile all functions that it calls."""
         settings = self.episode
         self._setup = Setup(
-            starts=empty_starts(0, Sizes(0, 0, 0)),  # the start is in the batch
+            starts=empty_starts(0, Sizes(0, 0, 0)),  # the batch already holds the start
             steps=settings.steps,
             frames=settings.simulation_frequency // settings.policy_frequency,
             dt=1.0 / settings.simulation_frequency,
@@ -275,7 +291,7 @@ class SharedControlEnv(HighwayEnv):
             self._setup = self._setup._replace(calls=self._calls)
 
     def _run_kernel(self, active: np.ndarray) -> None:
-        """One step of the batch of one."""
+        """Run one step of the kernel on the batch of size one."""
         self._taken[0] = 0
         kernel.advance(
             self._taken,
@@ -298,13 +314,14 @@ class SharedControlEnv(HighwayEnv):
         """Drive one time step.
 
         Args:
-            action: see :class:`SlotAction`.
+            action: dict of both slots, see :class:`SlotAction`.
 
         Returns:
-            Observation, reward, terminated (collision or off the road), truncated (duration) and info.
+            Observation, reward, terminated (collision or off the road), truncated (end of the duration or of the
+            road) and info.
 
         Raises:
-            ValueError: if the action is malformed; nothing has moved then.
+            ValueError: if the action is malformed; the state is unchanged then.
         """
         self._commands[0], self._alphas[0, 0] = self.action_type.decode(action)
         if self._bound != [self.vehicle, *self.road.vehicles]:
@@ -317,11 +334,11 @@ class SharedControlEnv(HighwayEnv):
         return self.observation.copy(), reward, terminated, truncated, info
 
     def _advance(self, resetting: bool) -> None:
-        """A step, or the begin of an episode: in one compiled call, or in several with Python in between."""
+        """Run a step, or begin an episode: in one compiled call, or in several calls with Python code in between."""
         frames = self._setup.frames
         recorder = self._record_video_wrapper
         every_frame = recorder is not None and recorder.recording and frames > 1
-        # Observation and info are the caller's, so they are new every time.
+        # The caller may keep observation and info, so new arrays are used in each step.
         self._outputs = self._outputs._replace(
             observations=np.zeros((1, self._observation.size), np.float32), infos=np.zeros(1, INFO)
         )
@@ -336,12 +353,12 @@ class SharedControlEnv(HighwayEnv):
         if not resetting:
             self.steps += 1
             self.time = self.steps / self.episode.policy_frequency
-        # An episode may be driven on past its end; the picture's path stays within the duration.
+        # An episode may be continued past its end; the drawn path ends with the duration.
         self._path[min(self.steps, len(self._path) - 1)] = self._batch.states[0, :2]
         self.noted, self.observation = self._outputs.infos.reshape(()), self._outputs.observations[0]
 
     def _advance_with_python(self, resetting: bool) -> None:
-        """The calls of :func:`kernel.advance` one after the other, with Python's vehicles and automation in between."""
+        """Make the calls of :func:`kernel.advance` one by one, with vehicles and automation in Python in between."""
         batch, setup, out, works = self._batch, self._setup, self._outputs, self._works
         given, signals = self._given_automation, self.signals
         if not resetting:
@@ -365,14 +382,14 @@ class SharedControlEnv(HighwayEnv):
         kernel.finish(resetting, batch, setup, out)
 
     def _decided(self, solution: Any) -> Solution:
-        """What another automation decided, checked, its command kept within the limits."""
+        """Check the solution of a user-defined automation, and clip its command to the limits."""
         if not isinstance(solution, Solution):
             raise ValueError(f"automation.act() gave {solution!r}, which is no controllers.solution.Solution")
         command = np.clip(checked_command(solution.command, "automation"), -self.command_limits, self.command_limits)
         return solution._replace(command=command)
 
     def _simulate(self, u: np.ndarray) -> None:
-        """Move all vehicles through one decision's simulation steps under a constant command, by highway-env."""
+        """Move all vehicles through the simulation steps of one decision with highway-env, under a constant command."""
         self.vehicle.act({"acceleration": float(u[0]), "steering": float(u[1])})
         self.road.update_rows()
         for frame in range(self._setup.frames):
@@ -384,22 +401,22 @@ class SharedControlEnv(HighwayEnv):
 
     @property
     def parameters(self) -> np.ndarray:
-        """Record of :class:`core.parameters.Parameters` that the core runs with."""
+        """Parameters of the core, a record of :class:`core.parameters.Parameters`."""
         return self._batch.parameters.reshape(())
 
     @property
     def scene(self) -> np.ndarray:
-        """Record of :data:`records.SCENE`, the present scene with its safe area."""
+        """The present scene with its safe area, a record of :data:`records.SCENE`."""
         return self._batch.scenes.reshape(())
 
     @property
     def signals(self) -> np.ndarray:
-        """Record of :data:`records.SIGNALS`: planned for the present scene after a reset or step."""
+        """Signals planned for the present scene after a reset or step, a record of :data:`records.SIGNALS`."""
         return self._batch.signals.reshape(())
 
     @property
     def memory(self) -> np.ndarray:
-        """Record of :data:`records.MEMORY`."""
+        """What the loop carries from step to step, a record of :data:`records.MEMORY`."""
         return self._batch.memories.reshape(())
 
     @property
@@ -414,29 +431,29 @@ class SharedControlEnv(HighwayEnv):
 
     @property
     def traffic(self) -> np.ndarray:
-        """The other vehicles as rows of :mod:`records`' traffic columns, shape (n, 8)."""
+        """The other vehicles, one per row, columns as in :mod:`core.records`, shape (n, 8)."""
         return self._batch.traffic[0]
 
     def _reward(self, action: Any) -> float:
-        """Reward of the step just taken: the weighted terms of :mod:`core.feedback.reward`."""
+        """Reward of the last step: the sum of the weighted terms of :mod:`core.feedback.reward`."""
         return float(self._outputs.rewards[0])
 
     def _rewards(self, action: Any) -> dict[str, float]:
-        """The unweighted terms of the step just taken, by name."""
+        """The unweighted reward terms of the last step, by name."""
         return dict(zip(self._terms, self.noted["rewards"].tolist(), strict=False))
 
     def _is_terminated(self) -> bool:
-        """Whether the step just taken ended in a collision or off the road."""
+        """Whether the last step ended in a collision or off the road."""
         return bool(self._outputs.terminations[0])
 
     def _is_truncated(self) -> bool:
-        """End of the duration, counted in whole steps, or of the road."""
+        """Whether the last step reached the end of the duration, counted in whole steps, or the end of the road."""
         return bool(self._outputs.truncations[0])
 
     def _info(self, obs: np.ndarray, action: Any = None) -> dict[str, Any]:
-        """Every signal of the step just taken, or of the reset (:data:`core.feedback.info.INFO`).
+        """All signals of the last step or reset (:data:`core.feedback.info.INFO`).
 
-        highway-env's own also carries the action, which is an unseeded sample at a reset; it is left out.
+        highway-env's info also contains the action, which is an unseeded sample at a reset. It is left out here.
         """
         info = as_dict(self.noted, self._terms)
         if type(self)._rewards is not SharedControlEnv._rewards:
@@ -444,13 +461,13 @@ class SharedControlEnv(HighwayEnv):
         return info
 
     def action_of(self, command: Any) -> np.ndarray:
-        """The action for a driver's command, which ``step`` takes in shares of the limits.
+        """Convert a driver's command to an action, in which commands are shares of the limits.
 
         Args:
             command: ``[a, delta]`` [m/s^2, rad], shape (2,).
 
         Returns:
-            float32, shape (2,); beyond [-1, 1] where the command is beyond the limits.
+            Array of float32, shape (2,) [-]; outside [-1, 1] if the command exceeds the limits.
         """
         return (np.asarray(command, dtype=float) / self.command_limits).astype(np.float32)
 
@@ -463,13 +480,15 @@ class SharedControlEnv(HighwayEnv):
         noted: np.ndarray,
         path: np.ndarray,
     ) -> None:
-        """Take over another environment's situation of the same settings, to draw it.
+        """Copy the present situation of another environment with the same settings, in order to draw it.
 
         Args:
-            state: of the ego, shape (6,).
-            traffic: of the other vehicles, shape (n, 8).
-            scene, signals, noted: records.
-            path: positions of the ego so far, shape (k + 1, 2).
+            state: state of the ego, shape (6,) [m, rad, m/s, rad/s].
+            traffic: other vehicles, one per row, shape (n, 8).
+            scene: record of :data:`records.SCENE`.
+            signals: record of :data:`records.SIGNALS`.
+            noted: record of :data:`info.INFO`.
+            path: positions of the ego so far, shape (k + 1, 2) [m].
         """
         self.vehicle.array[:] = state
         for vehicle, row in zip(self.road.vehicles[1:], traffic, strict=True):
@@ -484,7 +503,7 @@ class SharedControlEnv(HighwayEnv):
         return self._path[: self.steps + 1]
 
     def render(self) -> np.ndarray | None:
-        """Draw the present scene: a frame in ``rgb_array`` mode, the window in ``human`` mode."""
+        """Draw the present scene: returns a frame in ``rgb_array`` mode, updates the window in ``human`` mode."""
         if self.render_mode is None:
             return super().render()
         if self.viewer is None:
@@ -498,7 +517,7 @@ class SharedControlEnv(HighwayEnv):
 
     @property
     def spec(self) -> Any:
-        """Gymnasium's specification, with the settings in plain types, so that it can be written as JSON."""
+        """Gymnasium's specification, with the settings in plain types so that it can be written as JSON."""
         return self._spec
 
     @spec.setter
@@ -508,11 +527,11 @@ class SharedControlEnv(HighwayEnv):
         self._spec = spec
 
     def __getstate__(self) -> dict[str, Any]:
-        """State for pickles: all but windows and recorders, which belong to this process."""
+        """State for pickling, without what belongs to this process: viewer, recorder and function addresses."""
         process = {"viewer": None, "_record_video_wrapper": None, "_calls": NOT_LOADED, "_bound": None}
         return {**self.__dict__, **process}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Go on where the pickled or copied one was."""
+        """Restore a pickled or copied environment, with the function addresses of this process."""
         self.__dict__.update(state)
         refresh_addresses([self.episode], self._batch)

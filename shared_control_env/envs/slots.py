@@ -17,13 +17,20 @@ SLOT_SPACES: dict[str, spaces.Box] = {
     DRIVER: spaces.Box(-1.0, 1.0, shape=(2,), dtype=np.float32),
     AUTHORITY: spaces.Box(0.0, 1.0, shape=(1,), dtype=np.float32),
 }
-"""``driver``: desired acceleration and steering u_h,des over their limits; ``authority``: alpha_a."""
+"""Space of each slot. ``driver``: u_h,des, desired acceleration and steering as shares of their limits [-].
+``authority``: alpha_a [-]."""
 
 _BOUNDS = {name: (float(s.low[0]), float(s.high[0]), s.shape[0]) for name, s in SLOT_SPACES.items()}
 
 
 def space_of(slots: tuple[str, ...]) -> spaces.Space:
-    """A new space for some slots: a dict of several, one's own Box, or ``Discrete(1)``, to go on, for none."""
+    """A new action space: a Dict for several slots, a Box for one, ``Discrete(1)`` for none.
+
+    With no slot, the only action ``0`` lets the environment run on.
+
+    Args:
+        slots: names of the slots, keys of :data:`SLOT_SPACES`.
+    """
     boxes: dict[str, spaces.Space] = {}
     for slot in slots:
         boxes[slot] = spaces.Box(SLOT_SPACES[slot].low, SLOT_SPACES[slot].high, dtype=np.float32)
@@ -33,21 +40,21 @@ def space_of(slots: tuple[str, ...]) -> spaces.Space:
 
 
 SLACK = 1e-3
-"""How far a value may be beyond its bounds by rounding."""
+"""Largest excess of a value over its bounds that counts as rounding [-]."""
 
 
 class Clipping:
-    """Warns once of values that are beyond their bounds step after step, since they are in another unit, perhaps.
+    """Warns once if values exceed their bounds for many steps in a row; such values may be in another unit.
 
     Args:
-        num_envs: of how many environments.
+        num_envs: number of environments.
 
     Attributes:
-        in_a_row: whether any value of a slot was beyond its bounds in the step before, by the slot's name.
+        in_a_row: for each slot name, whether any value exceeded its bounds in the previous step.
     """
 
     PATIENCE = 20
-    """Steps in a row after which it is told."""
+    """Number of steps in a row after which the warning is given."""
 
     def __init__(self, num_envs: int = 1) -> None:
         self._steps = {slot: np.zeros(num_envs, dtype=int) for slot in SLOT_SPACES}
@@ -55,18 +62,22 @@ class Clipping:
         self._told = False
 
     def clear(self, ended: Any = slice(None)) -> None:
-        """Forget the steps so far, of the environments whose episodes have ended."""
+        """Reset the step counts of environments.
+
+        Args:
+            ended: index, slice or mask of the environments whose episodes have ended; all by default.
+        """
         for slot, steps in self._steps.items():
             if self.in_a_row[slot]:
                 steps[ended] = 0
 
     def note(self, slot: str, values: np.ndarray, beyond: bool) -> None:
-        """Note the values of one step.
+        """Count the values of one step that exceed their bounds, and warn if there are too many in a row.
 
         Args:
             slot: name of the slot.
-            values: shape (num_envs, size).
-            beyond: whether any of them is beyond its bounds.
+            values: values of the slot before clipping, shape (num_envs, size) [-].
+            beyond: whether any value exceeds its bounds.
         """
         if not beyond:
             if self.in_a_row[slot]:
@@ -88,12 +99,14 @@ class Clipping:
 
 
 def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
-    """A slot's value as an array within its bounds.
+    """The value of a slot as a new array, clipped to its bounds.
+
+    Values beyond the bounds are clipped, as highway-env's ContinuousAction does.
 
     Args:
         slot: name of the slot.
-        value: numbers of the slot's shape.
-        clipping: told of values beyond the bounds, which are clipped, as highway-env's ContinuousAction does.
+        value: numbers of the slot's shape [-].
+        clipping: counts the values beyond the bounds.
 
     Raises:
         ValueError: if the shape is wrong or an entry is not finite.

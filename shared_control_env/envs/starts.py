@@ -1,4 +1,4 @@
-"""The start of an episode as arrays: road, faults, parameters, ego and traffic, of one environment or of many."""
+"""The start of an episode as arrays (road, faults, parameters, ego, traffic), for one environment or for many."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from shared_control_env.envs.settings import LEAD_IN, Settings, fault_records, p
 
 
 class Start(NamedTuple):
-    """What an episode starts from.
+    """The start of one episode.
 
     Attributes:
         line: reference line of the road, shape (n, 6).
         faults: degradations as records of :class:`core.parameters.DegradationParameters`, shape (m,).
         parameters: record of :class:`core.parameters.Parameters`.
-        ego: state [x, y, psi, v_x, v_y, r], shape (6,).
-        traffic: other vehicles as rows of :mod:`core.records`' traffic columns, shape (n_vehicles, 8).
-        plans: what they are going to do, records of :class:`core.parameters.TrafficParameters`, shape (n_vehicles,).
+        ego: state of the ego, [x, y, psi, v_x, v_y, r] [m, rad, m/s, rad/s], shape (6,).
+        traffic: other vehicles, one per row; columns as in :mod:`core.records`, shape (n_vehicles, 8).
+        plans: plans of the other vehicles, records of :class:`core.parameters.TrafficParameters`, shape (n_vehicles,).
     """
 
     line: np.ndarray
@@ -49,10 +49,10 @@ class Start(NamedTuple):
 
 
 def start_of(settings: Settings) -> Start:
-    """The start that settings describe: the ego at s = 0, turning with the road.
+    """The start that the settings describe: the ego is at s = 0 and turns with the road.
 
     Args:
-        settings: of an episode, with nothing left to draw.
+        settings: settings of one episode, after all random draws.
     """
     line = reference_line([(s.length, s.curvature) for s in settings.road.segments], lead_in=LEAD_IN)
     d = settings.lane_centre(settings.ego.lane) + settings.ego.lateral_offset
@@ -68,12 +68,12 @@ def start_of(settings: Settings) -> Start:
 
 
 class Sizes(NamedTuple):
-    """How much a start can hold.
+    """Capacity of the arrays that hold a start.
 
     Attributes:
-        faults: degradations.
-        rows: of the reference line.
-        vehicles: other vehicles.
+        faults: number of degradations.
+        rows: number of rows of the reference line.
+        vehicles: number of other vehicles.
     """
 
     faults: int
@@ -82,10 +82,10 @@ class Sizes(NamedTuple):
 
 
 def sizes_for(templates: Sequence[Settings]) -> Sizes:
-    """Room for whatever any of the settings draws.
+    """Sizes that suffice for every episode that can be drawn from the settings.
 
     Args:
-        templates: settings of every environment; all have as many vehicles.
+        templates: settings of each environment; all have the same number of vehicles.
     """
     different = list({id(template): template for template in templates}.values())
     faults = max(len(template.faults) + (1 if template.degradations else 0) for template in different)
@@ -93,9 +93,9 @@ def sizes_for(templates: Sequence[Settings]) -> Sizes:
 
 
 def _most_rows(settings: Settings) -> int:
-    """Rows of the reference line: one for the lead-in and one for every segment, more where arcs are long.
+    """Largest number of rows of the reference line: the lead-in, every segment, and the pieces of long arcs.
 
-    The whole road turns by at most 2 pi, in pieces of up to pi / 2.
+    The whole road turns by at most 2 pi, and an arc is split into pieces of at most pi / 2.
     """
     if any(entry.setting.startswith("road") for entry in settings.randomise):
         return 1 + len(settings.road.segments) + 4
@@ -103,11 +103,11 @@ def _most_rows(settings: Settings) -> int:
 
 
 def empty_starts(n: int, sizes: Sizes) -> Starts:
-    """Arrays for n starts.
+    """Arrays of zeros for n starts.
 
     Args:
-        n: how many.
-        sizes: of each.
+        n: number of starts.
+        sizes: capacity for each start.
     """
     return Starts(
         parameters=np.zeros(n, record_dtype(Parameters)),
@@ -120,11 +120,14 @@ def empty_starts(n: int, sizes: Sizes) -> Starts:
 
 
 def grown(batch: Batch, sizes: Sizes) -> Batch:
-    """A batch with room for larger starts too; what is under way in it stays as it is.
+    """A batch with room for larger starts. The episodes that are running in it are kept.
 
     Args:
-        batch: of environments in the middle of episodes.
-        sizes: of the starts to come.
+        batch: state of environments that may be in the middle of an episode.
+        sizes: capacity that the next starts need.
+
+    Returns:
+        The batch itself if it is large enough, else a batch with larger arrays.
     """
     n, rows, faults = *batch.lines.shape[:2], batch.faults.shape[1]
     if sizes.rows <= rows and sizes.faults <= faults:
@@ -138,12 +141,14 @@ def grown(batch: Batch, sizes: Sizes) -> Batch:
 
 
 def write_start(start: Start, starts: Starts | Batch, i: int) -> None:
-    """Write an episode's start as entry i; what is left of a line begins at infinity, of the faults is none.
+    """Write the start of an episode as entry i.
+
+    Unused rows of the line get an infinite start position, and unused fault records are zero.
 
     Args:
-        start: of the episode.
-        starts: arrays with room for it, or the batch.
-        i: which entry.
+        start: start of the episode.
+        starts: arrays that are large enough for the start, or the batch.
+        i: index of the entry.
     """
     starts.parameters[i], starts.states[i] = start.parameters[()], start.ego
     starts.lines[i] = 0.0
@@ -155,12 +160,12 @@ def write_start(start: Start, starts: Starts | Batch, i: int) -> None:
 
 
 def empty_batch(n: int, sizes: Sizes, driver: bool = False) -> Batch:
-    """Arrays of n environments in which nothing has begun.
+    """Arrays of n environments before their first episode.
 
     Args:
-        n: how many.
-        sizes: of their starts.
-        driver: whether the kernel drives them.
+        n: number of environments.
+        sizes: capacity for their starts.
+        driver: whether the kernel runs the predictive driver.
     """
     return Batch(
         **empty_starts(n, sizes)._asdict(),
@@ -176,11 +181,11 @@ def empty_batch(n: int, sizes: Sizes, driver: bool = False) -> Batch:
 
 
 def refresh_addresses(episodes: Sequence[Settings], starts: Starts | Batch) -> None:
-    """Write again where compiled functions are, which differs from process to process.
+    """Write the addresses of compiled functions again, because they differ between processes.
 
     Args:
-        episodes: settings of each entry's episode.
-        starts: arrays that came from another process.
+        episodes: settings of the episode of each entry.
+        starts: arrays that were pickled or copied, possibly in another process.
     """
     for i, episode in enumerate(episodes):
         fresh = parameters_of(episode)

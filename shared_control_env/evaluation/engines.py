@@ -39,13 +39,21 @@ def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows
     Raises:
         WorkersLostError: if a process was killed, or could not begin.
     """
-    for batch in batches:
+    for table, entries in additions().items():
         try:
-            pickle.dumps((batch.driver, batch.authority, batch.automation, additions()))
+            pickle.dumps(entries)
         except Exception as error:
             raise WorkersLostError(
-                f"jobs = {jobs}: driver {batch.driver[0]!r}, authority {batch.authority[0]!r} or what was added "
-                f"cannot be sent to another process ({error}); define it in a file, under a name, or use jobs=1"
+                f"jobs = {jobs}: what was added to the {table} cannot be sent to another process ({error}); define it "
+                "in a file, under a name, or use jobs=1"
+            ) from None
+    for batch in batches:
+        try:
+            pickle.dumps((batch.driver, batch.authority, batch.automation))
+        except Exception as error:
+            raise WorkersLostError(
+                f"jobs = {jobs}: driver {batch.driver[0]!r} or authority {batch.authority[0]!r} cannot be sent to "
+                f"another process ({error}); define it in a file, under a name, or use jobs=1"
             ) from None
     first: dict[bool, Batch] = {}
     for batch in batches:

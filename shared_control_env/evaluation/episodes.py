@@ -161,7 +161,7 @@ def _joined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, An
 def source_digest() -> str:
     """Digest of the sources that the numbers come from, so that those of a changed checkout are told apart."""
     digest = sha256()
-    for folder in ("core", "controllers", "envs", "vector", "evaluation"):
+    for folder in ("core", "controllers", "envs", "vector", "learned", "evaluation"):
         for path in sorted((Path(shared_control_env.__file__).parent / folder).rglob("*.py")):
             if path.name not in NOT_IN_THE_NUMBERS:
                 digest.update(path.read_bytes())

@@ -1,4 +1,4 @@
-"""The limiter of the automation's authority: the paper's fuzzy inference, or any other allocator."""
+"""The limiter of the automation's authority: the paper's fuzzy inference, or another allocator."""
 
 from __future__ import annotations
 
@@ -14,17 +14,20 @@ from shared_control_env.wrappers.slots import SlotWrapper, check_reset
 
 
 class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
-    """Binds alpha_a: the risks r_x and r_y of letting u_a,f drive (Eq. 1-8), through the fuzzy inference (Eq. 9).
+    """Binds alpha_a: the fuzzy inference (Eq. 9) of the risks r_x and r_y of driving by u_a,f (Eq. 1-8).
 
-    What remains is the driver's command: the task that a learned or scripted driver solves. The risks are
-    those that the environment assesses with its settings, so that every allocator sees the same ones.
+    The open slot is the driver's command: the task that a learned or scripted driver solves. The environment assesses
+    the risks with its own settings, so that every allocator sees the same risks.
 
     Args:
-        env: an environment whose authority is open.
-        allocator: who decides; by default the fuzzy inference, with the operators of the settings.
+        env: an environment whose authority slot is open.
+        allocator: the allocator; by default the fuzzy inference, with the operators of the settings.
+
+    Attributes:
+        allocator: the allocator in use.
 
     Raises:
-        ValueError: if the allocator is no object with ``reset`` and ``allocate``.
+        ValueError: if the allocator is not an object with ``reset`` and ``allocate``.
     """
 
     def __init__(self, env: gym.Env, allocator: Allocator | None = None) -> None:
@@ -43,7 +46,14 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
         return FuzzyAuthority(self.shared.episode.authority.operators)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Reset environment and allocator; the seed of a given one comes from the environment's generator."""
+        """Reset the environment and the allocator.
+
+        A given allocator's seed is drawn from the environment's random generator.
+
+        Args:
+            seed: seed of the environment's random generator, or None.
+            options: options of Gymnasium's ``reset``.
+        """
         result = self.env.reset(seed=seed, options=options)
         if self._given is None:
             self.allocator = self._default()
@@ -56,5 +66,5 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
         """alpha_a of the planned step, shape (1,)."""
         scene, signals = self.shared.scene, self.shared.signals
         if self._given is not None:
-            scene, signals = scene.copy(), signals.copy()  # so that a user's allocator changes none of them
+            scene, signals = scene.copy(), signals.copy()  # so that a user's allocator cannot change them
         return np.array([checked_authority(self.allocator.allocate(scene, signals))])

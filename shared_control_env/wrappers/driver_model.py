@@ -18,16 +18,20 @@ from shared_control_env.wrappers.slots import SlotWrapper, check_reset
 class DriverModel(SlotWrapper, RecordConstructorArgs):
     """Binds the driver's command with any :class:`Driver`.
 
-    What remains is alpha_a: the task that a learned allocator solves; nothing, with the limiter applied too.
-    A driver that reports a ``solution`` has its status, iterations, residuals and failures in ``info["driver"]``, and a
-    person whether it drives, and what it noticed when.
+    The open slot is alpha_a: the task that a learned allocator solves. With the limiter applied too, no slot is open.
+    ``info["driver"]`` holds the status, iterations, residuals and failures of a driver that has a ``solution``. For a
+    person it also holds whether the person drives, and what the person noticed and when.
 
     Args:
-        env: an environment whose driver is open.
+        env: an environment whose driver slot is open.
         driver: the driver; by default the one of the settings: the paper's predictive driver, or a person.
 
+    Attributes:
+        driver: the driver in use.
+
     Raises:
-        ValueError: if the driver is no object with ``reset`` and ``act``; at a step, if it gives no two finite numbers.
+        ValueError: if the driver is not an object with ``reset`` and ``act``; at a step, if the driver does not return
+            two finite numbers.
     """
 
     def __init__(self, env: gym.Env, driver: Driver | None = None) -> None:
@@ -45,30 +49,39 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         self.driver: Driver = driver_of(parameters_of(self.shared.episode)) if driver is None else driver
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Reset environment and driver; the driver's seed is drawn from the environment's generator."""
+        """Reset the environment and the driver; the driver's seed is drawn from the environment's random generator.
+
+        Args:
+            seed: seed of the environment's random generator, or None.
+            options: options of Gymnasium's ``reset``.
+        """
         observation, info = self.env.reset(seed=seed, options=options)
         if self._given is None:
             self.driver = driver_of(parameters_of(self.shared.episode))
-        (own,) = self.shared.np_random.spawn(1)  # which takes nothing from the environment's own draws
+        (own,) = self.shared.np_random.spawn(1)  # spawning leaves the environment's own draws unchanged
         self.driver.reset(seed=int(own.integers(2**31)))
         return observation, {**info, **self._report()}
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Step with the driver's command; see :class:`SharedControlEnv`."""
+        """Step with the driver's command; see :class:`SharedControlEnv`.
+
+        Args:
+            action: the value of the slot that is still open.
+        """
         observation, reward, terminated, truncated, info = self.env.step(self.action(action))
         return observation, reward, terminated, truncated, {**info, **self._report()}
 
     def decide(self) -> np.ndarray:
-        """The driver's command over its limits, shape (2,)."""
+        """The driver's command divided by its limits, shape (2,)."""
         shared = self.shared
         if self._given is None:
             return checked_command(self.driver.act(shared.observation, shared.scene)) / shared.command_limits
-        # Copies, since what another's driver does to them must not reach the simulation.
+        # Copies, so that a user's driver cannot change the simulation.
         command = checked_command(self.driver.act(shared.observation.copy(), shared.scene.copy()))
         return np.clip(command / shared.command_limits, -1.0, 1.0)
 
     def _report(self) -> dict[str, Any]:
-        """The solver's report, with one form from the reset on."""
+        """The solver's report; it has the same keys at the reset and at every step."""
         if not hasattr(self.driver, "solution"):
             return {}
         solution = self.driver.solution
@@ -84,7 +97,7 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         }
 
     def _attention(self) -> dict[str, Any]:
-        """Whether a person drives, and what it noticed when; of another driver, that it drives."""
+        """Whether a person drives, and what the person noticed and when; any other driver counts as driving."""
         if not isinstance(self.driver, PersonDriver):
             return {"engaged": True, "noticed": inf, "reason": 0}
         return {name: self.driver.person[name].item() for name in ("engaged", "noticed", "reason")}

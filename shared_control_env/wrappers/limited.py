@@ -1,6 +1,6 @@
-"""The registered environments: a scenario with the authority limiter applied, unless it is left out.
+"""The registered environments: a scenario, by default with the authority limiter applied.
 
-The limiter is applied here and not in the registration, since Gymnasium's vector entry points allow no
+The limiter is applied here and not in the registration, since Gymnasium's vector entry points do not accept
 additional wrappers there.
 """
 
@@ -17,7 +17,7 @@ from shared_control_env.wrappers.authority_limiter import AuthorityLimiter
 
 
 class Limited:
-    """What ``gym.make`` calls; it reads the rendering modes from ``metadata``.
+    """The callable that ``gym.make`` uses as entry point; Gymnasium reads the rendering modes from ``metadata``.
 
     Args:
         scenario: class of the bare environment.
@@ -33,17 +33,17 @@ class Limited:
         limiter: bool | Allocator = True,
         automation: Planner | None = None,
     ) -> AuthorityLimiter | SharedControlEnv:
-        """The scenario's environment.
+        """Create the scenario's environment.
 
         Args:
             config: changes to its settings.
             render_mode: ``human``, ``rgb_array`` or None.
-            limiter: bind alpha_a with the fuzzy inference, as ``gym.make_vec`` does, or with another allocator; False
-                leaves both slots of the action open.
-            automation: who decides u_a,des in the predictive controller's place.
+            limiter: True binds alpha_a with the fuzzy inference, as ``gym.make_vec`` does. An allocator binds alpha_a
+                itself. False leaves both slots of the action open.
+            automation: planner that decides u_a,des instead of the predictive controller.
 
         Raises:
-            ValueError: for wrong settings, or what is no allocator or automation.
+            ValueError: for invalid settings, or for an object that is not an allocator or an automation.
         """
         env = self.scenario(config, render_mode=render_mode)
         if automation is not None:

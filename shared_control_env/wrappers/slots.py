@@ -1,4 +1,4 @@
-"""Binding of one slot of the action, which leaves the others to whoever acts."""
+"""Wrapper base that binds one slot of the action and leaves the other slot open."""
 
 from __future__ import annotations
 
@@ -15,24 +15,29 @@ from shared_control_env.envs.slots import SLOT_SPACES, space_of
 class SlotWrapper(gym.ActionWrapper):
     """Base of the wrappers that decide one slot of the action at every step.
 
-    The remaining action is the open slot's own Box, or ``Discrete(1)``, to go on, when none is open.
+    The remaining action space is the Box of the slot that is still open. If no slot is open, it is ``Discrete(1)``,
+    whose only action continues the episode.
 
     Args:
         env: an environment whose slot is open.
         slot: name of the slot.
 
+    Attributes:
+        slot: name of the bound slot.
+        open_slots: names of the slots that are still open.
+
     Raises:
-        ValueError: if the slot is bound already, or the environment has none.
+        ValueError: if the slot is already bound, or the environment has no slots.
     """
 
     def __init__(self, env: gym.Env, slot: str) -> None:
         super().__init__(env)
         if not isinstance(env.unwrapped, SharedControlEnv):
-            raise ValueError(f"env = {env} must be a SharedControlEnv, possibly wrapped, to have the slot {slot!r}")
+            raise ValueError(f"env = {env} has no slot {slot!r}; it must be a SharedControlEnv, possibly wrapped")
         self.slot = slot
         self._inner_slots = open_slots(env)
         if slot not in self._inner_slots:
-            raise ValueError(f"slot {slot!r} of {env} is bound already; open are {list(self._inner_slots)}")
+            raise ValueError(f"slot {slot!r} of {env} is bound already; the open slots are {list(self._inner_slots)}")
         self.open_slots = tuple(name for name in self._inner_slots if name != slot)
         self.action_space = space_of(self.open_slots)
 
@@ -46,7 +51,11 @@ class SlotWrapper(gym.ActionWrapper):
         raise NotImplementedError
 
     def action(self, action: Any) -> Any:
-        """The inner environment's action: the bound slot decided, the rest as given."""
+        """The inner environment's action: the bound slot as decided, and the other slot as given.
+
+        Args:
+            action: value of the slot that is still open.
+        """
         value = self.decide()
         if len(self._inner_slots) == 1:
             return value
@@ -55,7 +64,15 @@ class SlotWrapper(gym.ActionWrapper):
 
 
 def check_reset(player: Any, what: str) -> None:
-    """Raise ValueError unless a driver's or an allocator's ``reset`` takes a seed."""
+    """Check that the ``reset`` of a driver or an allocator takes a seed.
+
+    Args:
+        player: the driver or allocator.
+        what: name of the object for the error message.
+
+    Raises:
+        ValueError: if ``reset`` does not take a seed.
+    """
     try:
         inspect.signature(player.reset).bind(seed=0)
     except TypeError:
@@ -63,7 +80,11 @@ def check_reset(player: Any, what: str) -> None:
 
 
 def open_slots(env: gym.Env) -> tuple[str, ...]:
-    """Names of the slots that an environment's action leaves open."""
+    """Names of the slots that an environment's action leaves open.
+
+    Args:
+        env: the environment, possibly wrapped.
+    """
     while isinstance(env, gym.Wrapper):
         if isinstance(env, SlotWrapper):
             return env.open_slots

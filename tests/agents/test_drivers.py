@@ -11,16 +11,23 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'train'")
 from stable_baselines3 import A2C, DQN, PPO, SAC
 
 from agents.drivers import authority_entry, driver_entry, shipped
-from agents.history import HISTORY, History
 from agents.model_driver import ModelDriver
-from agents.policy import LearnedDriver, Policy
-from agents.recorded import RecordedDriver, RecordingDriver
 from agents.vec_envs import make_environment
-from agents.views import ALLOCATOR_FEATURES, DEAD_ZONE, DRIVER_FEATURES, allocator_view, command, driver_view
 from shared_control_env.controllers.driver import Driver, PredictiveDriver
+from shared_control_env.controllers.recorded import RecordedDriver, RecordingDriver
 from shared_control_env.core.parameters import Limits
 from shared_control_env.core.records import SCENE
 from shared_control_env.evaluation import Suite, evaluate
+from shared_control_env.learned.history import HISTORY, History
+from shared_control_env.learned.policy import LearnedDriver, Policy
+from shared_control_env.learned.views import (
+    ALLOCATOR_FEATURES,
+    DEAD_ZONE,
+    DRIVER_FEATURES,
+    allocator_view,
+    command,
+    driver_view,
+)
 from shared_control_env.wrappers import DriverModel
 
 ID = "SharedControl/TwoLane-v0"

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 from agents import evaluate, render
 from agents.card import card_of
 from agents.evaluate import COMPARED, KINDS, LEARNED, METRICS, compare, losses, measure, over_seeds
-from agents.history import HISTORY
-from agents.policy import Policy
 from agents.tasks import HELD_OUT_SEED
-from agents.views import FEATURES_OF
+from shared_control_env.learned.history import HISTORY
+from shared_control_env.learned.policy import Policy
+from shared_control_env.learned.views import FEATURES_OF
 
 ID = "SharedControl/Bend-v0"
 

@@ -10,10 +10,10 @@ import ray
 
 from agents import rllib
 from agents.card import card_of
-from agents.history import HISTORY
-from agents.policy import LearnedAllocator, LearnedDriver, Policy
 from agents.tasks import HELD_OUT_SEED, VALIDATION_SEED, training_config
-from agents.views import DRIVER_FEATURES
+from shared_control_env.learned.history import HISTORY
+from shared_control_env.learned.policy import LearnedAllocator, LearnedDriver, Policy
+from shared_control_env.learned.views import DRIVER_FEATURES
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
 
 ID = "SharedControl/LaneKeeping-v0"

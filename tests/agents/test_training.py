@@ -12,11 +12,11 @@ from stable_baselines3 import PPO
 from typer.testing import CliRunner
 
 from agents import train
-from agents.policy import LearnedAllocator, LearnedDriver, Policy
 from agents.tasks import HELD_OUT_DEGRADATIONS, HELD_OUT_SEED, TASKS, VALIDATION_SEED, training_config
 from agents.vec_envs import make_environment
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.evaluation import Suite, evaluate
+from shared_control_env.learned.policy import LearnedAllocator, LearnedDriver, Policy
 from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
 

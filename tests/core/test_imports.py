@@ -14,7 +14,7 @@ LAYERS = [
     ("shared_control_env.controllers",),
     ("shared_control_env.envs",),
     ("shared_control_env.wrappers", "shared_control_env.vector"),
-    ("shared_control_env.evaluation",),
+    ("shared_control_env.learned", "shared_control_env.evaluation"),
     ("agents",),
     ("experiments",),
 ]

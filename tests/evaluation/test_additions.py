@@ -55,7 +55,7 @@ def test_processes_know_what_was_added(program):
     assert one.returncode == two.returncode == 0, one.stderr + two.stderr
     assert one.stdout.startswith("8 40.0")
     assert (program / "one/episodes.parquet").is_file()
-    columns = lambda text: [line.rsplit(",", 6)[0] for line in text.splitlines()]  # noqa: E731
+    columns = lambda text: [line.rsplit(",", 6)[0] for line in text.splitlines()]
     assert columns(one.stdout) == columns(two.stdout)
 
 

@@ -12,9 +12,9 @@ from rich.console import Console
 
 from agents import train
 from agents.drivers import POLICIES, shipped
-from agents.policy import Policy
 from agents.tasks import TASKS
 from experiments import policies
+from shared_control_env.learned.policy import Policy
 
 
 def test_a_small_run_is_published(tmp_path, monkeypatch):

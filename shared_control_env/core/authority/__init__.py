@@ -1,1 +1,1 @@
-"""From the risks to the automation's actual command (Section IV)."""
+"""Allocation of authority: from the risks to the automation's actual command (Section IV)."""

@@ -1,9 +1,9 @@
 """Fuzzy inference of the automation's authority alpha_a from the two risks (Eq. 9, Section IV).
 
-The paper prints neither the operators, nor the rule table, nor the memberships' breakpoints. Ours:
-evenly spaced terms, Z- and S-shaped at the ends and triangular between; Mamdani inference; centre of
-gravity on 501 points. With product for "and" and sum for aggregation the surface is monotone in both
-risks; with minimum and maximum alpha_a rises by up to 0.007 along growing risk (both selectable).
+The paper prints neither the operators, nor the rule table, nor the breakpoints of the memberships. The choices made
+here are evenly spaced terms, Z- and S-shaped at the ends and triangular in between; Mamdani inference; and the centre
+of gravity on 501 points. Two pairs of operators can be selected. With product for "and" and sum for aggregation,
+alpha_a is monotone in both risks. With minimum and maximum, alpha_a rises by up to 0.007 where a risk grows.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from shared_control_env.core.compile.jit import jit, jit_allocating, jit_inlined
 
 OPERATORS = ("product-sum", "min-max")
-"""Names of the inference operators; an operator's index is its code in compiled functions."""
+"""Names of the pairs of inference operators; the index of a pair is its code in compiled functions."""
 
 RISK_TERMS = ("very small", "small", "medium", "big", "very big")
 AUTHORITY_TERMS = ("VVL", "VL", "L", "M", "H", "VH", "VVH")
@@ -29,27 +29,27 @@ RULES = np.array(
     ],
     dtype=np.int64,
 )
-"""Rule table (ours): index of the authority term for each pair of risk terms, falling in both."""
+"""Rule table (our choice): index of the authority term for each pair of risk terms; it decreases with both risks."""
 
 UNIVERSE = np.linspace(0.0, 1.0, 501)
-"""Points of the output over which the centre of gravity is taken."""
+"""Points of the output range over which the centre of gravity is computed [-]."""
 
 
 @jit
 def membership(value: float, term: int, n_terms: int) -> float:
     """Degree to which a value in [0, 1] belongs to one of n evenly spaced terms.
 
-    Inner terms are triangles of half-width ``w = 1/(n-1)`` about ``term w``. The first is Z-shaped, the
-    last S-shaped: two parabolas that meet at half the width, ``1 - 2 q^2`` and ``2 (1 - q)^2``, with
-    q the distance from the end over w.
+    Inner terms are triangles of half-width ``w = 1/(n-1)`` about ``term w``. The first term is Z-shaped and the last
+    S-shaped: each consists of two parabolas that meet at half the width, ``1 - 2 q^2`` and ``2 (1 - q)^2``, where q is
+    the distance from the end of the range divided by w.
 
     Args:
-        value: in [0, 1].
+        value: risk or authority in [0, 1] [-].
         term: index of the term, 0 to n_terms - 1.
         n_terms: number of terms.
 
     Returns:
-        Degree in [0, 1].
+        Degree in [0, 1] [-].
     """
     q = abs(value * (n_terms - 1) - term)
     if q >= 1.0:
@@ -60,7 +60,7 @@ def membership(value: float, term: int, n_terms: int) -> float:
 
 
 OUTPUT_TERMS = np.array([[membership(value, term, 7) for value in UNIVERSE] for term in range(7)])
-"""Membership of every output term on the universe, shape (7, 501)."""
+"""Membership of every output term at the points of :data:`UNIVERSE`, shape (7, 501)."""
 
 _MASS = OUTPUT_TERMS.sum(axis=1)
 _MOMENT = OUTPUT_TERMS @ UNIVERSE
@@ -68,13 +68,13 @@ _MOMENT = OUTPUT_TERMS @ UNIVERSE
 
 @jit_inlined
 def centroid_product_sum(r_x: float, r_y: float) -> float:
-    """Centre of gravity with product and sum.
+    """Centre of gravity with product for "and" and implication, and sum for aggregation.
 
-    The aggregate is ``sum_ij mu_i(r_x) mu_j(r_y) B_ij(z)``, linear in the output sets, so its mass and moment
-    over the 501 points are sums of those of the seven terms.
+    The aggregate is ``sum_ij mu_i(r_x) mu_j(r_y) B_ij(z)``. It is linear in the output sets, so its mass and moment
+    over the 501 points are sums of the masses and moments of the seven terms.
 
     Args:
-        r_x, r_y: risks in [0, 1].
+        r_x, r_y: longitudinal and lateral risk in [0, 1] [-].
 
     Returns:
         Centre of gravity, before :func:`authority` rescales it.
@@ -92,10 +92,10 @@ def centroid_product_sum(r_x: float, r_y: float) -> float:
 
 @jit_allocating
 def centroid_min_max(r_x: float, r_y: float) -> float:
-    """Centre of gravity with minimum for "and" and implication, maximum for aggregation.
+    """Centre of gravity with minimum for "and" and implication, and maximum for aggregation.
 
     Args:
-        r_x, r_y: risks in [0, 1].
+        r_x, r_y: longitudinal and lateral risk in [0, 1] [-].
 
     Returns:
         Centre of gravity, before :func:`authority` rescales it.
@@ -124,15 +124,15 @@ _LOW, _HIGH = _MOMENT[0] / _MASS[0], _MOMENT[6] / _MASS[6]
 def authority(r_x: float, r_y: float, operators: int) -> float:
     """Authority of the automation, ``alpha_a = FIS(r_x, r_y)``.
 
-    The centre of gravity alone spans 0.048 to 0.952; it is rescaled so that alpha_a(0, 0) = 1 ("very
+    The centre of gravity alone spans only 0.048 to 0.952. It is rescaled so that alpha_a(0, 0) = 1 ("very
     high, -> 1" in the text) and the strongest rule gives 0.
 
     Args:
-        r_x, r_y: longitudinal and lateral risk in [0, 1].
-        operators: code of :data:`OPERATORS`.
+        r_x, r_y: longitudinal and lateral risk in [0, 1] [-].
+        operators: index in :data:`OPERATORS`.
 
     Returns:
-        alpha_a in [0, 1].
+        alpha_a in [0, 1] [-].
     """
     centre = centroid_product_sum(r_x, r_y) if operators == 0 else centroid_min_max(r_x, r_y)
     return min(max((centre - _LOW) / (_HIGH - _LOW), 0.0), 1.0)

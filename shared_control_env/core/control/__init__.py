@@ -1,1 +1,1 @@
-"""The controllers: the automation's (Eq. 12, 13), the driver's (Eq. 14-16), and the person around the latter."""
+"""The controllers: the automation (Eq. 12, 13), the driver (Eq. 14-16), and the model of a person at the wheel."""

@@ -1,1 +1,1 @@
-"""What goes wrong with the automation: degradations of its command and of its perception."""
+"""Faults of the automation: degradations of its command and of its perception."""

@@ -1,6 +1,6 @@
-"""Degradations of the automation's command (Eq. 17, 18 and kinds of our own), each of a kind of :mod:`faults.kinds`.
+"""Degradations of the automation's command: Eq. 17, 18 and the further kinds of :mod:`faults.kinds`.
 
-Every degradation grows over a ramp from its onset on, lasts for a duration, and may come and go.
+Every degradation begins at its onset, grows over a ramp and lasts for a duration. It may be intermittent.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ CHANNELS = ("acceleration", "steering")
 """Names of the command's channels, in the order of every command array ``[a, delta]``."""
 
 PLACES = ("planner", "command", "actuator")
-"""Where degradations of the command act; a place's index is its code.
+"""Places where degradations of the command act; the index of a place is its code.
 
-``planner``: u_a,des itself is wrong, and nobody knows what it should be. ``command``: between the automation and the
-limiter, which knows u_a,des; the paper's. ``actuator``: on u_a,act, whatever the limiter has made of it.
+``planner``: u_a,des itself is wrong, and the correct command is unknown. ``command``: between the automation and the
+limiter, which knows u_a,des; this is the paper's place. ``actuator``: on u_a,act, after the limiter.
 """
 
 PLANNER, COMMAND, ACTUATOR = range(3)
@@ -31,10 +31,10 @@ _act, _advance = ACT.call, ADVANCE.call
 
 @jit
 def has_set_in(fault: DegradationParameters, t: float) -> bool:
-    """Whether a degradation is there; one that comes and goes is there throughout.
+    """Whether time t lies between the onset and the end of a degradation, pauses of an intermittent one included.
 
     Args:
-        fault: the degradation.
+        fault: parameters of the degradation.
         t: time [s].
     """
     return fault.kind != 0 and fault.onset <= t < fault.onset + fault.duration
@@ -42,17 +42,17 @@ def has_set_in(fault: DegradationParameters, t: float) -> bool:
 
 @jit
 def severity(fault: DegradationParameters, t: float) -> float:
-    """Share of its full size that a degradation has at time t.
+    """Severity g of a degradation at time t: the present share of its full size.
 
-    ``g = min((t - onset) / ramp, 1)`` from onset to onset + duration; a step where ramp is 0; and 0 in the
-    rest of every period of one that comes and goes, after the first ``duty period``.
+    ``g = min((t - onset) / ramp, 1)`` from onset to onset + duration, and a step where ramp is 0. An intermittent
+    degradation acts in the first part of each period, of length ``duty period``; in the rest of the period g is 0.
 
     Args:
-        fault: the degradation.
+        fault: parameters of the degradation.
         t: time [s].
 
     Returns:
-        g in [0, 1].
+        g in [0, 1] [-].
     """
     if not has_set_in(fault, t):
         return 0.0
@@ -64,10 +64,11 @@ def severity(fault: DegradationParameters, t: float) -> float:
 
 @jit
 def clear_faults(memories: np.ndarray) -> None:
-    """Forget that any degradation has acted.
+    """Reset the memories of all degradations at the start of an episode.
 
     Args:
-        memories: records of :data:`records.FAULT_MEMORY`, shape (n,); what else they keep is written before it is read.
+        memories: records of :data:`records.FAULT_MEMORY`, shape (n,). The fields not reset here are always written
+            before they are read.
     """
     for i in range(memories.shape[0]):
         memories[i].acting = False
@@ -76,7 +77,7 @@ def clear_faults(memories: np.ndarray) -> None:
 
 @jit
 def _remember(memory: FaultMemory, u: np.ndarray, acting: bool, k: int) -> None:
-    """Keep what a later step of a degradation may need of the present command u, shape (2,)."""
+    """Store what later steps of a degradation may need of the present command u, shape (2,)."""
     for channel in range(2):
         memory.past[k % MAX_DELAY, channel] = u[channel]
         if acting and not memory.acting:
@@ -96,19 +97,20 @@ def degrade(
     limits: Limits,
     u_f: np.ndarray,
 ) -> None:
-    """Apply one degradation after the other to the automation's desired command, and clip to the physical limits.
+    """Apply all degradations in turn to the automation's command, and clip the result to the physical limits.
 
-    A degradation of both channels whose size is in the unit of its channel has it as a steering angle, or as its rate;
-    the acceleration takes the same share of its limit. To be called once at every time step.
+    A degradation may act on both channels and have a size in the unit of its channel. The size is then a steering
+    angle or steering rate, and the acceleration changes by the same share of its limit. The function must be called
+    exactly once per time step.
 
     Args:
         u_des: desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
-        k: time step.
-        dt: time step [s].
+        k: index of the time step.
+        dt: duration of a time step [s].
         faults: records of :class:`DegradationParameters`, shape (n,).
-        memories: records of :data:`records.FAULT_MEMORY`, shape (n,).
-        limits: physical limits.
-        u_f: the degraded command is written here, shape (2,).
+        memories: records of :data:`records.FAULT_MEMORY`, updated, shape (n,).
+        limits: physical limits of the commands.
+        u_f: degraded command [m/s^2, rad], written, shape (2,); may be ``u_des`` itself.
     """
     u_f[0], u_f[1] = u_des[0], u_des[1]
     for i in range(faults.shape[0]):

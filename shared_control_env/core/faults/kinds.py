@@ -1,8 +1,8 @@
-"""The kinds of degradation, one row each: what it is called, what its size means, and what it does.
+"""The table of all kinds of degradation: the name of each kind, the meaning of its size, and its effect.
 
-Names follow the usage of fault-tolerant control (Blanke et al., Diagnosis and Fault-Tolerant Control, Chapter 1;
+The names follow the usage of fault-tolerant control (Blanke et al., Diagnosis and Fault-Tolerant Control, Chapter 1;
 Zhang & Jiang, Bibliographical Review on Reconfigurable Fault-Tolerant Control Systems, 2008): bias, loss of
-effectiveness, stuck (lock in place), saturation, and so on. :func:`add_kind` adds one from outside the package.
+effectiveness, stuck (lock in place), saturation, and so on. :func:`add_kind` adds a kind from outside the package.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from shared_control_env.core.records import MAX_DELAY, FaultMemory, Signals
 from shared_control_env.nearest import hint
 
 COMMAND, RATE, SHARE, TIME, LENGTH = "command", "rate", "share", "time", "length"
-"""What a size is: in the unit of its channel [m/s^2 or rad], that per second, a share in [0, 1], [s], or [m]."""
+"""Units of a size: the channel's unit [m/s^2 or rad], the channel's unit per second, a share in [0, 1], [s], or [m]."""
 
 UNITS = (COMMAND, RATE, SHARE, TIME, LENGTH)
 
 
 class Acting(NamedTuple):
-    """A degradation at work on one channel.
+    """A degradation that acts on one channel of the command.
 
     Attributes:
-        fault: its parameters.
-        memory: what it carries from step to step.
+        fault: parameters of the degradation.
+        memory: what the degradation carries from step to step.
         channel: 0 for the acceleration, 1 for the steering.
-        u: the channel's command [m/s^2 or rad].
-        g: severity, in (0, 1].
-        size: of this channel, in the kind's unit.
-        bound: the channel's physical limit [m/s^2 or rad].
-        k: time step.
-        dt: time step [s].
+        u: command of the channel [m/s^2 or rad].
+        g: severity, in (0, 1] [-].
+        size: size of the degradation in this channel, in the kind's unit.
+        bound: physical limit of the channel [m/s^2 or rad].
+        k: index of the time step.
+        dt: duration of a time step [s].
     """
 
     fault: DegradationParameters
@@ -50,26 +50,27 @@ class Acting(NamedTuple):
 
 
 ACT = Interface(float, by_value(Acting))
-"""``act(acting)``: one channel's command under a degradation."""
+"""``act(acting) -> command``: command of one channel under a degradation [m/s^2 or rad]."""
 
 ADVANCE = Interface(None, DegradationParameters, FaultMemory, int, float)
-"""``advance(fault, memory, k, dt)``: carry a degradation's memory to step k, acting or not."""
+"""``advance(fault, memory, k, dt)``: advance a degradation's memory to step k, whether it acts or not."""
 
 PERCEIVE = Interface(None, DegradationParameters, float, Signals)
-"""``perceive(fault, g, signals)``: add to ``signals.misperception`` what the automation's perception has wrong."""
+"""``perceive(fault, g, signals)``: add the errors of the automation's perception to ``signals.misperception``."""
 
 
 class Kind(NamedTuple):
     """A kind of degradation.
 
     Attributes:
-        name: in settings.
-        unit: what its size is, see :data:`COMMAND`; None for a kind that has no size.
-        act: the degraded command of one channel, given an :class:`Acting`.
-        perceive: of the automation's perception, compiled as :data:`PERCEIVE`.
-        advance: what its memory needs at every step, compiled as :data:`ADVANCE`.
-        heeds: fields of the settings that it heeds beside its size: ``seed``, ``time_constant``, ``frequency``.
-        channels: that it may name, where it acts on none of them.
+        name: name of the kind in the settings.
+        unit: unit of the size, see :data:`COMMAND`; None for a kind that has no size.
+        act: function that returns the degraded command of one channel, compiled with the signature :data:`ACT`.
+        perceive: function that changes the automation's perception, compiled with the signature :data:`PERCEIVE`.
+        advance: function that advances the memory at every step, compiled with the signature :data:`ADVANCE`.
+        heeds: fields of the settings that the kind uses beside its size: ``seed``, ``time_constant``, ``frequency``.
+        channels: channels that the settings of this kind may name. A kind that changes only the perception acts on
+            none of them.
     """
 
     name: str
@@ -82,7 +83,7 @@ class Kind(NamedTuple):
 
     @property
     def draws(self) -> bool:
-        """Whether it draws random numbers, whose seed is part of its settings."""
+        """Whether the kind draws random numbers; their seed is then part of its settings."""
         return "seed" in self.heeds
 
 
@@ -97,40 +98,40 @@ def _loss_of_effectiveness(c: Acting) -> float:
 
 
 def _stuck(c: Acting) -> float:
-    """The command at the moment it set in."""
+    """The command at the onset of the degradation."""
     return c.memory.kept[c.channel]
 
 
 def _rate_limit(c: Acting) -> float:
-    """The command within ``size dt`` of the last one."""
+    """The command, limited to within ``size dt`` of the last command."""
     last, most = c.memory.last[c.channel], c.size * c.dt
     return min(max(c.u, last - most), last + most)
 
 
 def _saturation(c: Acting) -> float:
-    """The command within ``(1 - g size) bound``."""
+    """The command, limited to an absolute value of ``(1 - g size) bound``."""
     bound = (1.0 - c.g * c.size) * c.bound
     return min(max(c.u, -bound), bound)
 
 
 def _delay(c: Acting) -> float:
-    """The command of the time ``t - g size``."""
+    """The command at the time ``t - g size``."""
     steps = min(round(c.g * c.size / c.dt), MAX_DELAY - 1)
     return c.memory.past[max(c.k - steps, 0) % MAX_DELAY, c.channel]
 
 
 def _white_noise(c: Acting) -> float:
-    """``u + g size n_k`` with independent standard normal n_k."""
+    """``u + g size n_k`` with independent standard normal numbers n_k."""
     return c.u + c.g * c.size * standard_normal(c.fault.seed, 2 * c.k + c.channel)
 
 
 def _coloured_noise(c: Acting) -> float:
-    """``u + g size x_k`` with x_k of :func:`core.faults.noise.coloured`."""
+    """``u + g size x_k`` with the coloured noise x_k of :func:`core.faults.noise.coloured`."""
     return c.u + c.g * c.size * c.memory.noise[c.channel]
 
 
 def _advance_noise(fault: DegradationParameters, memory: FaultMemory, k: int, dt: float) -> None:
-    """x_k of both channels."""
+    """Advance the coloured noise x_k of both channels."""
     for channel in range(2):
         x = memory.noise[channel]
         memory.noise[channel] = coloured(x, fault.seed, 2 * k + channel, k, fault.time_constant, dt)
@@ -142,7 +143,7 @@ def _oscillation(c: Acting) -> float:
 
 
 def _drop_out(c: Acting) -> float:
-    """No command."""
+    """Zero command."""
     return 0.0
 
 
@@ -152,12 +153,12 @@ def _sign_error(c: Acting) -> float:
 
 
 def _lane_offset(fault: DegradationParameters, g: float, signals: Signals) -> None:
-    """The automation believes to be ``g size`` further to the left than it is."""
+    """The automation perceives the ego ``g size`` further to the left than it is."""
     signals.misperception[0] += g * fault.size
 
 
 def _missed_lead(fault: DegradationParameters, g: float, signals: Signals) -> None:
-    """The automation does not see the vehicle that precedes."""
+    """The automation does not perceive the preceding vehicle."""
     if g > 0.0:
         signals.misperception[1] = 1.0
 
@@ -181,17 +182,21 @@ KINDS: dict[str, Kind] = {
         Kind("missed_lead", None, perceive=_missed_lead, channels=("steering", "acceleration")),
     )
 }
-"""All kinds by name, in the order of their codes; ``none`` has the code 0."""
+"""All kinds by name. Their order gives their codes; ``none`` has the code 0."""
+
+STANDARD = tuple(KINDS)
+"""Names of the package's own; those that others add come after them."""
 
 
 def add_kind(kind: Kind) -> None:
-    """Add a kind, which settings may name from then on; no registered environment draws it.
+    """Add a kind of degradation. Settings can then name it; no registered environment draws it at random.
 
     Args:
-        kind: its functions take and give what :class:`Kind` says.
+        kind: the kind; its functions have the signatures that :class:`Kind` names, and are compiled here.
 
     Raises:
-        ValueError: if its name is taken, its unit unknown, or it does nothing, or what numba cannot compile.
+        ValueError: if the name is taken, if the unit is unknown, if the kind has neither ``act`` nor ``perceive``, or
+            if numba cannot compile a function.
     """
     if kind.name in KINDS:
         raise ValueError(f"kind {kind.name!r} is there already")
@@ -204,7 +209,14 @@ def add_kind(kind: Kind) -> None:
 
 
 def addresses(kind: Kind) -> tuple[int, int, int]:
-    """Where the compiled forms of a kind's act, perceive and advance are; 0 for what it has not."""
+    """Addresses of the compiled functions ``act``, ``perceive`` and ``advance`` of a kind; 0 for a missing function.
+
+    Args:
+        kind: kind of degradation.
+
+    Raises:
+        ValueError: if numba cannot compile a function.
+    """
     return (
         0 if kind.act is None else ACT.address(kind.act),
         0 if kind.perceive is None else PERCEIVE.address(kind.perceive),

@@ -1,4 +1,4 @@
-"""Random numbers of a compiled step: a function of a seed and a counter, so that no state is carried."""
+"""Random numbers for compiled steps, as functions of a seed and a counter, so that no state needs to be carried."""
 
 from __future__ import annotations
 
@@ -16,9 +16,13 @@ _UNIT = 2.0**-53
 
 @jit
 def uniform(seed: int, counter: int) -> float:
-    """A number in [0, 1): entry ``counter`` of SplitMix64's sequence from the seed.
+    """Uniform random number in [0, 1): entry ``counter`` of the SplitMix64 sequence of a seed.
 
-    (Steele, Lea & Flood, Fast Splittable Pseudorandom Number Generators, OOPSLA 2014, Fig. 16.)
+    SplitMix64 is given by Steele, Lea & Flood, Fast Splittable Pseudorandom Number Generators, OOPSLA 2014, Fig. 16.
+
+    Args:
+        seed: seed of the sequence.
+        counter: index of the entry.
     """
     z = np.uint64(seed) + np.uint64(counter + 1) * _GOLDEN
     z = (z ^ (z >> _SHIFTS[0])) * _MIX_1
@@ -29,25 +33,33 @@ def uniform(seed: int, counter: int) -> float:
 
 @jit
 def standard_normal(seed: int, counter: int) -> float:
-    """A standard normal number by Box & Muller's transform of the entries 2 counter and 2 counter + 1."""
+    """Standard normal random number by the Box-Muller transform of two entries of :func:`uniform`.
+
+    Args:
+        seed: seed of the sequence.
+        counter: index of the number; it uses the entries 2 counter and 2 counter + 1 of the sequence.
+    """
     radius = sqrt(-2.0 * log(1.0 - uniform(seed, 2 * counter)))
     return radius * cos(2.0 * pi * uniform(seed, 2 * counter + 1))
 
 
 @jit
 def coloured(previous: float, seed: int, counter: int, k: int, time_constant: float, dt: float) -> float:
-    """x_k of a stationary first-order process of unit variance.
+    """Coloured noise: value x_k of a stationary first-order process of unit variance.
 
     ::
 
         x_0 = n_0,   x_k = phi x_k-1 + sqrt(1 - phi^2) n_k,   phi = exp(-dt / time_constant)
 
     Args:
-        previous: x_k-1; not used at k = 0.
-        seed, counter: of n_k, see :func:`standard_normal`.
-        k: step.
-        time_constant: of the process [s].
-        dt: time step [s].
+        previous: x_k-1 [-]; not used at k = 0.
+        seed, counter: seed and index of n_k, see :func:`standard_normal`.
+        k: index of the time step.
+        time_constant: correlation time of the process [s].
+        dt: duration of a time step [s].
+
+    Returns:
+        x_k [-].
     """
     n = standard_normal(seed, counter)
     if k == 0:

@@ -1,4 +1,4 @@
-"""What the automation's perception has wrong, and the scene as the automation sees it."""
+"""Errors of the automation's perception, and the scene as the automation perceives it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _perceive = PERCEIVE.call
 
 @jit
 def misperceive(t: float, faults: np.ndarray, signals: Signals) -> None:
-    """What the automation's perception has wrong, of all degradations together.
+    """Compute the errors of the automation's perception, summed over all degradations.
 
     Args:
         t: time [s].
         faults: records of :class:`DegradationParameters`, shape (n,).
         signals: record of :data:`records.SIGNALS`; ``misperception`` is written: the offset to the left [m], and 1
-            where the lead is missed, else 0.
+            if the preceding vehicle is missed, else 0.
     """
     signals.misperception[0], signals.misperception[1] = 0.0, 0.0
     for i in range(faults.shape[0]):
@@ -31,14 +31,15 @@ def misperceive(t: float, faults: np.ndarray, signals: Signals) -> None:
 
 @jit
 def see_as_automation(misperception: np.ndarray, p: Parameters, view: Scene) -> None:
-    """Turn a copy of the scene into what the automation takes it for.
+    """Change a copy of the scene to the scene that the automation perceives.
 
-    Missing the vehicle that precedes, it drives at its own target speed.
+    An automation that misses the preceding vehicle tracks the target speed of the task.
 
     Args:
-        misperception: of :func:`misperceive`, shape (2,).
+        misperception: errors from :func:`misperceive`: offset to the left [m], 1 if the preceding vehicle is missed;
+            shape (2,).
         p: parameters.
-        view: record of :data:`records.SCENE`, a copy of the scene; changed.
+        view: copy of the scene, record of :data:`records.SCENE`, changed in place.
     """
     view.z[1] += misperception[0]
     if misperception[1] > 0.0:

@@ -1,1 +1,1 @@
-"""What a step gives back: observation, reward and info."""
+"""Outputs of a step: observation, reward and info."""

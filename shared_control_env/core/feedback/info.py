@@ -1,4 +1,4 @@
-"""Every signal of a step as one record, which both kinds of environment report as ``info``."""
+"""All signals of a step as one record, which the single and the vectorised environment report as ``info``."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from shared_control_env.core.records import (
 
 
 class AutomationReport:
-    """How the automation came to its command.
+    """Outcome of the automation's solver.
 
     Attributes:
         status: control.automation.CONVERGED, ITERATION_LIMIT or FAILED.
-        iterations: done.
-        residual: projected gradient.
-        failures: steps so far at which the last command was held.
+        iterations: number of Gauss-Newton iterations.
+        residual: projected gradient [-].
+        failures: number of steps so far at which the solver failed, so that the last command was held.
     """
 
     status: int
@@ -41,37 +41,41 @@ class AutomationReport:
 
 
 class Info:
-    """Signals of the step just taken, from its start (k) on; from ``speed`` on, what it led to.
+    """Signals of the step just taken, at time step k, followed by the outcome of the step.
+
+    The fields from ``speed`` on hold after the step. Every command is ``[a, delta]`` [m/s^2, rad].
 
     Attributes:
-        k: time step of the signals.
-        t: its time [s].
-        state: ego [x, y, psi, v_x, v_y, r], Cartesian frame [m, rad, m/s, rad/s].
-        z: ego [s, y, psi, v_x, v_y, r], road frame.
+        k: index of the time step.
+        t: time at the start of the step [s].
+        state: ego [x, y, psi, v_x, v_y, r] in the Cartesian frame [m, rad, m/s, rad/s].
+        z: ego [s, y, psi, v_x, v_y, r] in the road frame [m, rad, m/s, rad/s].
         y_target: lateral position to track [m].
         v_target: speed to track [m/s].
-        neighbours: follower, leader, preceding: present, s [m], d [m], speed [m/s], traffic row.
-        u_a_des: the automation's desired command [m/s^2, rad].
-        u_a_f: the same, degraded.
-        u_a_act: limited.
+        neighbours: rows of follower, leader and preceding vehicle: [1 if present, s [m], d [m], speed [m/s], traffic
+            row].
+        u_a_des: the automation's desired command.
+        u_a_f: the automation's desired command after degradation.
+        u_a_act: the automation's actual command, after the authority law.
         u_h_des: the driver's desired command.
         u_h_act: the driver's actual command.
         u: command that drove the vehicle.
         r_x, r_y: longitudinal and lateral risk [-].
         alpha_a: authority of the automation [-].
-        prediction: xi(k + tau_p) = [x, y, psi, v, a, r], Cartesian frame.
-        prediction_road: its (s, d) [m].
-        safe_area_lower, safe_area_upper: boundaries of C, vertices (s, d) [m].
+        prediction: predicted state xi(k + tau_p) = [x, y, psi, v, a, r] in the Cartesian frame.
+        prediction_road: predicted position (s, d) in the road frame [m].
+        safe_area_lower, safe_area_upper: boundaries of the safe area C, vertices (s, d) [m].
         safe_area_outcome: safe_area.REACHED or BLOCKED.
-        fault: what the degradations add to the command, u_a,f - u_a,des: ground truth.
-        misperception: the automation's lane offset [m], 1 where it misses its lead: ground truth.
-        fault_active: whether any degradation has set in: ground truth.
-        automation: how it came to its command.
+        fault: change of the command that the degradations cause, u_a,f - u_a,des; ground truth.
+        misperception: the automation's lane offset [m], and 1 if it misses the preceding vehicle; ground truth.
+        fault_active: whether any degradation has set in; ground truth.
+        automation: outcome of the automation's solver.
         speed: v_x after the step [m/s].
-        crashed, on_road: after the step.
-        in_lane: whether the ego's centre is in the lane to keep.
-        lane_departures: times that the centre has left the lane to keep.
-        rewards: unweighted terms, in the order that the settings name them.
+        crashed: whether the ego has collided, after the step.
+        on_road: whether the ego's centre lies between the edges of the road, after the step.
+        in_lane: whether the ego's centre is in the lane to keep, after the step.
+        lane_departures: number of times that the ego's centre has left the lane to keep.
+        rewards: unweighted terms of the reward [-], in the order of the settings.
     """
 
     k: int
@@ -112,13 +116,13 @@ INFO = record_dtype(Info)
 
 @jit
 def note_signals(scene: Scene, signals: Signals, faults: np.ndarray, failures: int, info: Info) -> None:
-    """Copy the signals of a scene's time step.
+    """Copy the signals of the scene's time step to the info.
 
     Args:
         scene: record of :data:`records.SCENE`.
         signals: record of :data:`records.SIGNALS`.
         faults: records of :class:`DegradationParameters`, shape (n,).
-        failures: of the automation's solver so far.
+        failures: number of steps so far at which the automation's solver failed.
         info: record of :data:`INFO`, written up to ``automation``.
     """
     info.k, info.t = scene.k, scene.t
@@ -149,10 +153,10 @@ def note_signals(scene: Scene, signals: Signals, faults: np.ndarray, failures: i
 
 @jit
 def note_outcome(speed: float, transition: Transition, memory: Memory, info: Info) -> None:
-    """Copy what a step led to.
+    """Copy the outcome of a step to the info.
 
     Args:
-        speed: [m/s].
+        speed: v_x after the step [m/s].
         transition: record of :data:`records.TRANSITION` after the step.
         memory: record of :data:`records.MEMORY`.
         info: record of :data:`INFO`, written from ``speed`` on.
@@ -164,11 +168,11 @@ def note_outcome(speed: float, transition: Transition, memory: Memory, info: Inf
 
 
 def as_dict(info: np.ndarray, terms: Sequence[str]) -> dict[str, Any]:
-    """Info as a nested dict: plain numbers, and views of the record's arrays.
+    """Info as a nested dict of plain numbers and views of the record's arrays.
 
     Args:
-        info: of :data:`INFO`, a 0-d array.
-        terms: names of the reward's terms.
+        info: record of :data:`INFO`, a 0-d array.
+        terms: names of the reward's terms, in the order of the settings.
     """
     values = _named(info.item(), info.dtype)
     values["rewards"] = dict(zip(terms, values["rewards"].tolist(), strict=False))
@@ -176,12 +180,12 @@ def as_dict(info: np.ndarray, terms: Sequence[str]) -> dict[str, Any]:
 
 
 def as_batch(records: np.ndarray, mask: np.ndarray, terms: Sequence[str] = ()) -> dict[str, Any]:
-    """Records as Gymnasium's nested dict of arrays, each with the mask of the environments that have it.
+    """Records as Gymnasium's nested dict of arrays, each array followed by the mask of the environments that have it.
 
     Args:
-        records: of a structured type, shape (N,).
-        mask: which environments have them, shape (N,).
-        terms: names of the reward's terms, where the type is :data:`INFO`.
+        records: records of a structured type, shape (N,).
+        mask: whether each environment has a record, shape (N,).
+        terms: names of the reward's terms, in the order of the settings; needed if the type is :data:`INFO`.
     """
     values: dict[str, Any] = {}
     for name in records.dtype.names or ():
@@ -196,12 +200,12 @@ def as_batch(records: np.ndarray, mask: np.ndarray, terms: Sequence[str] = ()) -
 
 
 def _masked(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:
-    """Every entry followed by its mask."""
+    """Dict with every entry followed by the mask."""
     return {key: value for name, entry in values.items() for key, value in ((name, entry), (f"_{name}", mask))}
 
 
 def _named(values: tuple[Any, ...], dtype: np.dtype) -> dict[str, Any]:
-    """A record's values by their names."""
+    """Values of a record by the names of their fields."""
     names, nested = _fields(dtype)
     named = dict(zip(names, values, strict=True))
     for name, inner in nested:
@@ -211,6 +215,6 @@ def _named(values: tuple[Any, ...], dtype: np.dtype) -> dict[str, Any]:
 
 @cache
 def _fields(dtype: np.dtype) -> tuple[tuple[str, ...], tuple[tuple[str, np.dtype], ...]]:
-    """Names of a record's fields, and those that are records themselves."""
+    """Names of a record's fields, and names and types of those fields that are records themselves."""
     names = dtype.names or ()
     return names, tuple((name, dtype[name]) for name in names if dtype[name].names)

@@ -1,6 +1,6 @@
-"""What a driver can perceive, as a bounded vector: named, versioned specifications, one of which settings select.
+"""Observations: what a driver can perceive, as a bounded vector, in named and versioned specifications.
 
-:func:`add_observation` adds one from outside the package.
+The settings select one specification. :func:`add_observation` adds a specification from outside the package.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from shared_control_env.core.world.road import curvature_at
 from shared_control_env.nearest import hint
 
 PREVIEW = np.array([0.0, 10.0, 20.0, 40.0])
-"""Distances ahead at which the road's curvature is seen [m]."""
+"""Distances ahead at which the observation contains the road's curvature [m]."""
 
 WRITE = Interface(None, Scene, Memory, MATRIX, Parameters, SINGLES)
-"""``write(scene, memory, line, p, out)``: the features of an observation in their units, shape (n,)."""
+"""``write(scene, memory, line, p, out)``: write the features of an observation, in their units, to out, shape (n,)."""
 
 _write = WRITE.call
 
 
 class Observation(NamedTuple):
-    """A specification of an observation. What it gives never changes: a change is a new name.
+    """Specification of an observation. A specification never changes: a changed one gets a new name.
 
     Attributes:
-        name: with its version, in settings.
+        name: name in the settings, version included.
         features: name and scale of every entry; the entry is the feature divided by its scale, clipped to [-1, 1].
-        write: writes the features in their units, compiled as :data:`WRITE`.
+        write: function that writes the features in their units, compiled with the signature :data:`WRITE`.
     """
 
     name: str
@@ -42,22 +42,22 @@ class Observation(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Entries of the observation."""
+        """Number of entries of the observation."""
         return len(self.features)
 
     @property
     def scales(self) -> np.ndarray:
-        """Scale of every entry, in its unit, shape (n,)."""
+        """Scale of every entry, in the unit of the feature, shape (n,)."""
         return np.array([scale for _, scale in self.features])
 
     def place_of(self, feature: str) -> int:
-        """Place of a feature.
+        """Index of a feature in the observation.
 
         Args:
-            feature: its name.
+            feature: name of the feature.
 
         Raises:
-            ValueError: if there is none of this name.
+            ValueError: if the observation has no feature of this name.
         """
         names = [name for name, _ in self.features]
         if feature not in names:
@@ -93,7 +93,7 @@ _DRIVER_V0 = (
 
 
 def _write_driver_v0(scene: Scene, memory: Memory, line: np.ndarray, p: Parameters, out: np.ndarray) -> None:
-    """The driver's view; the fault, the automation's command and its risk are not in it."""
+    """Write the driver's view. It does not contain the fault, the automation's command or the risk."""
     z = scene.z
     out[0], out[1], out[2], out[3], out[4] = z[1] - scene.y_target, z[2], z[3], z[4], z[5]
     out[5] = z[3] - scene.v_target
@@ -115,20 +115,23 @@ def _write_driver_v0(scene: Scene, memory: Memory, line: np.ndarray, p: Paramete
 
 
 DRIVER_V0 = Observation("driver-v0", _DRIVER_V0, _write_driver_v0)
-"""What a driver can perceive; the default of every environment."""
+"""The driver's view; the default observation of every environment."""
 
 OBSERVATIONS: dict[str, Observation] = {DRIVER_V0.name: DRIVER_V0}
 """All observations by name."""
 
+STANDARD = tuple(OBSERVATIONS)
+"""Names of the package's own; those that others add come after them."""
+
 
 def add_observation(observation: Observation) -> None:
-    """Add an observation, which settings may select from then on.
+    """Add an observation. Settings can then select it by its name.
 
     Args:
-        observation: its name says its version.
+        observation: specification whose name includes its version; its function is compiled here.
 
     Raises:
-        ValueError: if its name is taken, or numba cannot compile it.
+        ValueError: if the name is taken, or if numba cannot compile the function.
     """
     if observation.name in OBSERVATIONS:
         raise ValueError(f"observation {observation.name!r} is there already")
@@ -140,16 +143,16 @@ def add_observation(observation: Observation) -> None:
 def observe(
     address: int, scales: np.ndarray, scene: Scene, memory: Memory, line: np.ndarray, p: Parameters, out: np.ndarray
 ) -> None:
-    """Write the observation of a scene: the features over their scales, clipped to [-1, 1].
+    """Write the observation of a scene: the features divided by their scales, clipped to [-1, 1].
 
     Args:
-        address: of the observation's compiled function.
-        scales: of its features, shape (n,).
+        address: address of the observation's compiled function.
+        scales: scales of the features, in the units of the features, shape (n,).
         scene: record of :data:`records.SCENE`.
-        memory: record of :data:`records.MEMORY`: the driver's last command, and alpha_a.
+        memory: record of :data:`records.MEMORY`, which holds the driver's last command.
         line: reference line, shape (m, 6).
         p: parameters.
-        out: written, float32, shape (n,).
+        out: observation [-], written, float32, shape (n,).
     """
     _write(address, scene, memory, line, p, out)
     for i in range(out.shape[0]):

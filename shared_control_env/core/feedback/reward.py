@@ -1,6 +1,6 @@
-"""The reward: a weighted sum of named terms, each about 1 in size; one row of :data:`TERMS` a term.
+"""The reward: a weighted sum of named terms, each of the order of 1. :data:`TERMS` has one row per term.
 
-:func:`add_term` adds one from outside the package; settings then name its weight.
+:func:`add_term` adds a term from outside the package; the settings then give its weight.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import Scene, Signals, Transition
 
 COMFORT_JERK = 5.0
-"""Jerk that counts 1 [m/s^3]; the limit of ISO 11270 averages to this over half a second."""
+"""Jerk at which the comfort term saturates [m/s^3]: the average limit of ISO 11270 over half a second."""
 
 COMFORT_LATERAL = 3.0
-"""Lateral acceleration that counts 1 [m/s^2]; ISO 11270."""
+"""Lateral acceleration at which the comfort term saturates [m/s^2]; ISO 11270."""
 
 
 class Step(NamedTuple):
-    """What a term of the reward sees of a step.
+    """What a term of the reward is computed from.
 
     Attributes:
-        transition: where it led from, and whether it failed.
-        scene: after the step.
-        signals: of the step.
+        transition: values from before the step, and whether the step ended in a failure.
+        scene: scene after the step.
+        signals: signals of the step.
         p: parameters.
     """
 
@@ -37,7 +37,7 @@ class Step(NamedTuple):
 
 
 VALUE = Interface(float, by_value(Step))
-"""``value(step)``: a term, unweighted."""
+"""``value(step) -> value``: unweighted value of a term [-]."""
 
 _value = VALUE.call
 
@@ -46,9 +46,9 @@ class Term(NamedTuple):
     """A term of the reward.
 
     Attributes:
-        name: in settings and in info.
-        weight: by default [-].
-        value: of a :class:`Step`.
+        name: name of the term in the settings and in ``info``.
+        weight: default weight [-].
+        value: function that returns the unweighted value for a :class:`Step`.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Term(NamedTuple):
 
 
 def _progress(step: Step) -> float:
-    """``ds / (dt target_speed)`` in [-1, 1]: along the lane, so that neither standing nor turning in place pays."""
+    """``ds / (dt target_speed)`` in [-1, 1]: progress along the lane; standing or turning in place gives no reward."""
     task = step.p.task
     progress = (step.scene.z[0] - step.transition.previous_s) / (task.dt * task.target_speed)
     return min(max(progress, -1.0), 1.0)
@@ -88,7 +88,7 @@ def _comfort(step: Step) -> float:
 
 
 def _conflict(step: Step) -> float:
-    """``-sum max(0, -u_h,act u_a,act) / bound^2``: the driver working against the automation."""
+    """``-sum max(0, -u_h,act u_a,act) / bound^2``: penalty where driver and automation act against each other."""
     u_h, u_a, limits = step.signals.u_h_act, step.signals.u_a_act, step.p.limits
     value = -max(0.0, -u_h[0] * u_a[0]) / limits.a_max**2
     return value - max(0.0, -u_h[1] * u_a[1]) / limits.delta_max**2
@@ -111,20 +111,20 @@ TERMS: dict[str, Term] = {
         Term("failure", 50.0, _failure),
     )
 }
-"""All terms by name. The weights are ours."""
+"""All terms by name. The weights are choices of this implementation."""
 
 STANDARD = tuple(TERMS)
-"""Names of the terms that every environment has; others act where settings name them."""
+"""Names of the terms that every environment has; other terms apply only where the settings name them."""
 
 
 def add_term(term: Term) -> None:
-    """Add a term, which settings may give a weight from then on; no registered environment has it.
+    """Add a term. Settings can then give it a weight; no registered environment has it.
 
     Args:
-        term: its value is compiled as :data:`VALUE`.
+        term: term whose function has the signature :data:`VALUE`; the function is compiled here.
 
     Raises:
-        ValueError: if its name is taken, or numba cannot compile it.
+        ValueError: if the name is taken, or if numba cannot compile the function.
     """
     if term.name in TERMS:
         raise ValueError(f"reward term {term.name!r} is there already")
@@ -137,13 +137,13 @@ def reward(transition: Transition, scene: Scene, signals: Signals, p: Parameters
     """Reward of one step: the weighted sum of its terms.
 
     Args:
-        transition: record of :data:`records.TRANSITION`; ``terms`` is written, unweighted.
+        transition: record of :data:`records.TRANSITION`; the unweighted ``terms`` are written.
         scene: record of :data:`records.SCENE` after the step.
         signals: record of :data:`records.SIGNALS` of the step.
-        p: parameters; ``p.reward`` says which terms, and how much each counts.
+        p: parameters; ``p.reward`` holds the terms and their weights.
 
     Returns:
-        The sum.
+        The weighted sum [-].
     """
     total = 0.0
     for i in range(p.reward.n_terms):

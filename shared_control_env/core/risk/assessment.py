@@ -1,4 +1,4 @@
-"""Risk assessment of the degraded automation (Section III): prediction, lateral and longitudinal risk."""
+"""Risk assessment of the degraded automation (Section III): prediction, then lateral and longitudinal risk."""
 
 from __future__ import annotations
 
@@ -30,17 +30,19 @@ from shared_control_env.core.world.vehicle import PSI, V_X, R, implicit_step
 
 @jit_inlined
 def predict_ego(scene: Scene, u_f: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals) -> None:
-    """Prediction xi(k + tau_p) of the ego under the degraded command (Eq. 1).
+    """Predict the ego state xi(k + tau_p) under the degraded command (Eq. 1).
 
-    The yaw rate is that of the dynamic model after one step under u_a,f; pose and speed are the present
-    ones. "In the road frame" has two readings on a curve: the tangent frame at the ego, or the curvilinear
-    one. The tangent drifts off by x^2 / 2R (0.3 m in Case 2), which would itself count as risk; so
-    the prediction runs in the Cartesian frame and its end is located on the road.
+    The prediction starts from the present pose and speed. Its yaw rate is that of the dynamic model after one step
+    under u_a,f.
+
+    Readings of "in the road frame" on a curve: the tangent frame at the ego, or the curvilinear frame. The tangent
+    departs from the road by x^2 / 2R (0.3 m in Case 2), which would itself count as risk. The prediction therefore
+    runs in the Cartesian frame, and its end point is then located on the road.
 
     Args:
         scene: record of :data:`records.SCENE`.
-        u_f: degraded command, shape (2,).
-        line: reference line.
+        u_f: degraded command ``[a, delta]`` [m/s^2, rad], shape (2,).
+        line: reference line, shape (m, 6).
         p: parameters.
         signals: record of :data:`records.SIGNALS`; ``prediction`` and ``prediction_road`` are written.
     """
@@ -57,14 +59,14 @@ def predict_ego(scene: Scene, u_f: np.ndarray, line: np.ndarray, p: Parameters, 
 
 @jit_inlined
 def predict_neighbours(scene: Scene, traffic: np.ndarray, line: np.ndarray, tau: float, predicted: np.ndarray) -> None:
-    """Prediction of the three neighbours by Eq. 1 under their present acceleration and yaw rate.
+    """Predict the three neighbours by Eq. 1 under their present acceleration and yaw rate.
 
     Args:
         scene: record of :data:`records.SCENE`.
         traffic: other vehicles, shape (n, 8).
-        line: reference line.
-        tau: horizon [s].
-        predicted: rows ``[present, s, v]``, written, shape (3, 3).
+        line: reference line, shape (m, 6).
+        tau: prediction horizon [s].
+        predicted: rows ``[1 if present, s, v]`` [-, m, m/s], written, shape (3, 3).
     """
     for i in range(3):
         predicted[i, 0] = scene.neighbours[i, PRESENT]
@@ -77,18 +79,19 @@ def predict_neighbours(scene: Scene, traffic: np.ndarray, line: np.ndarray, tau:
 
 @jit_inlined
 def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals) -> None:
-    """Both risks of letting ``signals.u_a_f`` drive the car (Eq. 1-8).
+    """Compute both risks that arise if the degraded command ``signals.u_a_f`` drives the car (Eq. 1-8).
 
     Args:
-        scene: record of :data:`records.SCENE`, its safe area found.
+        scene: record of :data:`records.SCENE` with the safe area.
         traffic: other vehicles, shape (n, 8).
-        line: reference line.
+        line: reference line, shape (m, 6).
         p: parameters.
-        signals: ``prediction``, ``prediction_road``, ``predicted_neighbours``, ``r_x`` and ``r_y`` are written.
+        signals: record of :data:`records.SIGNALS`; ``prediction``, ``prediction_road``, ``predicted_neighbours``,
+            ``r_x`` and ``r_y`` are written.
     """
     predict_ego(scene, signals.u_a_f, line, p, signals)
     predict_neighbours(scene, traffic, line, p.task.tau_p, signals.predicted_neighbours)
-    if p.authority.shared:  # the monitor looks through the automation's eyes
+    if p.authority.shared:  # the monitor has the same errors of perception as the automation
         signals.prediction_road[1] += signals.misperception[0]
         if signals.misperception[1] > 0.0:
             signals.predicted_neighbours[PRECEDING, 0] = 0.0

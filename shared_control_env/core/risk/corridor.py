@@ -1,4 +1,4 @@
-"""The search through the triangles of the driving region, and the boundaries of what it finds (Table I, steps 2-4)."""
+"""Search through the triangles of the driving region, and the boundaries of the result (Table I, steps 2-4)."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from shared_control_env.core.risk.safe_area import BLOCKED, ON_LINE, REACHED
 
 
 class Scratch(NamedTuple):
-    """What a search through n triangles works in; longer arrays do as well.
+    """Scratch arrays of a search through n triangles; the arrays may be longer.
 
     Attributes:
-        neighbours: :func:`adjacency`, (n, 3).
-        distance: length of the shortest way into each triangle [m], (n,).
-        at: where that way enters it, (s, d) [m], (n, 2).
-        parent: the triangle it is entered from, or -1, (n,).
-        entry: the edge it is entered by, or -1, (n,).
-        done: 1 where its distance is final, (n,).
-        sequence: triangles of the way found, from front to rear, (n,).
-        stack: triangles and edges yet to look at, (3 n, 2).
-        ring: outline of the triangles that can be entered, (s, d) [m], (3 n + 2, 2).
+        neighbours: list of adjacent triangles, see :func:`adjacency`, shape (n, 3).
+        distance: length of the shortest path into each triangle [m], shape (n,).
+        at: point (s, d) at which the shortest path enters each triangle [m], shape (n, 2).
+        parent: index of the triangle from which the path comes, or -1, shape (n,).
+        entry: index of the edge at which the path enters, or -1, shape (n,).
+        done: 1 for each triangle whose distance is final, else 0, shape (n,).
+        sequence: triangles of the path found, from front to rear, shape (n,).
+        stack: triangles and edges that remain to be examined, shape (3 n, 2).
+        ring: outline (s, d) of the triangles that can be entered [m], shape (3 n + 2, 2).
     """
 
     neighbours: np.ndarray
@@ -39,10 +39,10 @@ class Scratch(NamedTuple):
 
 
 def new_scratch(n: int) -> Scratch:
-    """Scratch for n triangles.
+    """Scratch arrays for n triangles.
 
     Args:
-        n: how many.
+        n: number of triangles.
     """
     return Scratch(
         np.empty((n, 3), dtype=np.int64),
@@ -61,20 +61,22 @@ def new_scratch(n: int) -> Scratch:
 def search_triangles(
     triangles: np.ndarray, start: float, end: float, d: float, min_width: float, scratch: Scratch, area: SafeArea
 ) -> None:
-    """Sequence of triangles from the ego to the final region, and its boundaries (Table I, steps 2-4).
+    """Find the sequence of triangles from the ego to the final region, and its boundaries (Table I, steps 2-4).
 
-    The table says only to search adjacent triangles until the final one is found. Readings: the fewest
-    triangles, or the shortest way. The fewest depends on which diagonal a rectangle happens to get,
-    so the shortest way through the midpoints of the shared edges is taken (Dijkstra). A way narrower
-    than the vehicle is none. Without a way to the front line the outcome is BLOCKED, and the area is
-    the union of all triangles that can be entered; where corners lie on a circle these depend on the diagonals.
+    The table only says that adjacent triangles are searched until the final triangle is found. Readings: the smallest
+    number of triangles, or the shortest path. The smallest number depends on the arbitrary choice of the diagonal of a
+    rectangle, so the shortest path through the midpoints of the shared edges is used (Dijkstra). A passage narrower
+    than the vehicle does not count.
+
+    If no path reaches the front line, the outcome is BLOCKED, and the area is the union of all triangles that can be
+    entered. Where corners are cocircular, these triangles depend on the choice of the diagonals.
 
     Args:
-        triangles: shape (m, 3, 2), in any order and orientation.
-        start, end: rear and front line of the region [m].
+        triangles: vertices (s, d) [m], in any order and orientation, shape (m, 3, 2); made counter-clockwise.
+        start, end: path lengths of the rear and the front line of the region [m].
         d: lateral position of the ego on the rear line [m].
-        min_width: narrowest passage [m].
-        scratch: for as many triangles.
+        min_width: smallest width of a passage [m].
+        scratch: scratch arrays for at least m triangles.
         area: record of :data:`records.SAFE_AREA`, written.
     """
     orient(triangles)
@@ -97,7 +99,11 @@ def search_triangles(
 
 @jit_inlined
 def orient(triangles: np.ndarray) -> None:
-    """Make every triangle counter-clockwise, in place; shape (m, 3, 2)."""
+    """Make every triangle counter-clockwise, in place.
+
+    Args:
+        triangles: vertices (s, d) [m], overwritten, shape (m, 3, 2).
+    """
     for i in range(triangles.shape[0]):
         a, b, c = triangles[i, 0], triangles[i, 1], triangles[i, 2]
         if (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) < 0.0:
@@ -107,14 +113,14 @@ def orient(triangles: np.ndarray) -> None:
 
 @jit
 def _left_and_right(triangles: np.ndarray, i: int, edge: int) -> tuple[float, float, float, float]:
-    """Ends of an edge as seen when leaving a counter-clockwise triangle over it: left s, d, right s, d."""
+    """Left end (s, d) and right end (s, d) of an edge, as seen on leaving a counter-clockwise triangle over the edge."""
     right, left = triangles[i, edge], triangles[i, (edge + 1) % 3]
     return left[0], left[1], right[0], right[1]
 
 
 @jit
 def _same_edge(triangles: np.ndarray, i: int, edge: int, j: int) -> int:
-    """Which edge of triangle j is the given edge of triangle i, or -1."""
+    """Index of the edge of triangle j that is the given edge of triangle i, or -1."""
     ls, ld, rs, rd = _left_and_right(triangles, i, edge)
     for other in range(3):
         a, b = triangles[j, other], triangles[j, (other + 1) % 3]
@@ -125,12 +131,13 @@ def _same_edge(triangles: np.ndarray, i: int, edge: int, j: int) -> int:
 
 @jit_inlined
 def adjacency(triangles: np.ndarray, neighbours: np.ndarray) -> None:
-    """Adjacency (Table I, step 3) as a list: ``[i, edge]`` is the triangle over that edge, or -1.
+    """Adjacency of the triangles (Table I, step 3) as a list.
 
-    The table's matrix D(i, j) is 1 where j is in row i.
+    Entry ``[i, edge]`` is the index of the triangle on the other side of that edge of triangle i, or -1. The matrix
+    D(i, j) of the table is 1 where row i contains j.
 
     Args:
-        triangles: counter-clockwise, shape (m, 3, 2).
+        triangles: counter-clockwise vertices (s, d) [m], shape (m, 3, 2).
         neighbours: integers, written, shape (>= m, 3).
     """
     n = triangles.shape[0]
@@ -144,7 +151,7 @@ def adjacency(triangles: np.ndarray, neighbours: np.ndarray) -> None:
 
 @jit_inlined
 def _edge_on_line(triangles: np.ndarray, line: float, d: float) -> tuple[int, int]:
-    """Triangle and edge on the line s = line that hold, or are nearest to, the lateral position d; or -1, -1."""
+    """Triangle and edge on the line s = line that contain the lateral position d or are nearest to it; or -1, -1."""
     triangle, found, nearest = -1, -1, np.inf
     for i in range(triangles.shape[0]):
         for edge in range(3):
@@ -158,7 +165,7 @@ def _edge_on_line(triangles: np.ndarray, line: float, d: float) -> tuple[int, in
 
 @jit
 def _edge_distance(triangles: np.ndarray, i: int, edge: int, s: float, d: float) -> float:
-    """Distance from a point to an edge."""
+    """Distance from a point (s, d) to an edge [m]."""
     a, b = triangles[i, edge], triangles[i, (edge + 1) % 3]
     es, ed = b[0] - a[0], b[1] - a[1]
     along = ((s - a[0]) * es + (d - a[1]) * ed) / (es * es + ed * ed)
@@ -179,16 +186,17 @@ def clearance(
 ) -> float:
     """Width of the passage through a triangle from one edge to another [m].
 
-    The way bends around the vertex that both edges share. Its width is the distance from there to the nearest
-    boundary on the other side, looked for through the open edges (Demyen & Buro, Efficient
-    Triangulation-Based Pathfinding, AAAI 2006), and at most the length of either edge.
+    The path bends around the vertex that both edges share. The width is the distance from this vertex to the nearest
+    boundary on the other side, and at most the length of either edge. The search for the boundary looks through the
+    open edges (Demyen & Buro, Efficient Triangulation-Based Pathfinding, AAAI 2006).
 
     Args:
-        triangles, neighbours: as of :func:`adjacency`.
-        i: the triangle.
-        entry, leave: its two edges.
-        start, end: rear and front line, which are open.
-        stack: of a :class:`Scratch`, written.
+        triangles: counter-clockwise vertices (s, d) [m], shape (m, 3, 2).
+        neighbours: list of adjacent triangles, see :func:`adjacency`, shape (>= m, 3).
+        i: index of the triangle.
+        entry, leave: indices of its two edges.
+        start, end: path lengths of the rear and the front line [m]; both lines are open.
+        stack: stack of a :class:`Scratch`, overwritten.
     """
     ls, ld, rs, rd = _left_and_right(triangles, i, entry)
     width = hypot(ls - rs, ld - rd)
@@ -230,10 +238,10 @@ def _search(
     min_width: float,
     scratch: Scratch,
 ) -> tuple[int, int]:
-    """Dijkstra from the ego's triangle through the midpoints of the edges crossed; fills ``scratch``.
+    """Dijkstra's search from the ego's triangle through the midpoints of the crossed edges; fills ``scratch``.
 
     Returns:
-        The triangle in which the front line is reached and its edge there, or -1.
+        Triangle in which the path reaches the front line, and the edge of the triangle on that line; or -1, -1.
     """
     n, neighbours = triangles.shape[0], scratch.neighbours
     distance, at, parent, entry, done = scratch.distance, scratch.at, scratch.parent, scratch.entry, scratch.done
@@ -273,7 +281,7 @@ def _search(
 
 @jit
 def _start_chains(area: SafeArea, s: float, d: float) -> None:
-    """Set both boundaries to a single point, the form of an empty area."""
+    """Set both boundaries to a single point, which represents an empty area."""
     for k in range(MAX_CHAIN):
         area.lower[k, 0], area.lower[k, 1] = s, d
         area.upper[k, 0], area.upper[k, 1] = s, d
@@ -281,7 +289,7 @@ def _start_chains(area: SafeArea, s: float, d: float) -> None:
 
 @jit
 def _append(chain: np.ndarray, n: int, s: float, d: float) -> int:
-    """Append a vertex unless it repeats the last or the chain is full; return the new length."""
+    """Append a vertex unless it repeats the last vertex or the chain is full; return the new length."""
     if (n > 0 and chain[n - 1, 0] == s and chain[n - 1, 1] == d) or n == MAX_CHAIN:
         return n
     chain[n, 0], chain[n, 1] = s, d
@@ -290,7 +298,10 @@ def _append(chain: np.ndarray, n: int, s: float, d: float) -> int:
 
 @jit
 def _finish_chains(area: SafeArea, n_lower: int, n_upper: int) -> None:
-    """Repeat the last vertices to the arrays' ends; a chain that filled its array may be cut: blocked there."""
+    """Repeat the last vertex of each chain up to the end of its array.
+
+    A chain that fills its array may have been cut off; the outcome is then BLOCKED.
+    """
     if n_lower == MAX_CHAIN or n_upper == MAX_CHAIN:
         area.outcome = BLOCKED
     for k in range(n_lower, MAX_CHAIN):
@@ -301,7 +312,7 @@ def _finish_chains(area: SafeArea, n_lower: int, n_upper: int) -> None:
 
 @jit_inlined
 def _trace_sequence(triangles: np.ndarray, goal: int, front_edge: int, scratch: Scratch, area: SafeArea) -> None:
-    """Boundaries of the sequence: left and right ends of every edge it crosses, from rear to front."""
+    """Write the boundaries of the sequence: the left and right ends of every crossed edge, from rear to front."""
     parent, entry, sequence = scratch.parent, scratch.entry, scratch.sequence
     length = 0
     i = goal
@@ -312,7 +323,7 @@ def _trace_sequence(triangles: np.ndarray, goal: int, front_edge: int, scratch: 
     n_lower = n_upper = 0
     for k in range(length - 1, -1, -1):
         i = sequence[k]
-        # Entering over an edge mirrors leaving over it: its left end lies to the right of the way.
+        # Entering over an edge mirrors leaving over it: the left end on leaving lies to the right on entering.
         rs, rd, ls, ld = _left_and_right(triangles, i, entry[i])
         n_lower = _append(area.lower, n_lower, rs, rd)
         n_upper = _append(area.upper, n_upper, ls, ld)
@@ -324,9 +335,9 @@ def _trace_sequence(triangles: np.ndarray, goal: int, front_edge: int, scratch: 
 
 @jit_inlined
 def _trace_reachable(triangles: np.ndarray, first: int, scratch: Scratch, area: SafeArea) -> None:
-    """Outline of all triangles entered, from the right end of the rear edge around to its left end.
+    """Write the outline of all entered triangles, from the right end of the rear edge around to its left end.
 
-    The outline is split at its vertex furthest ahead into the lower and the upper boundary.
+    The outline is split into the lower and the upper boundary at the vertex that is furthest ahead.
     """
     neighbours, parent, entry = scratch.neighbours, scratch.parent, scratch.entry
     stack, ring = scratch.stack, scratch.ring

@@ -1,4 +1,4 @@
-"""The safe area C of a scene (Table I): holes, triangles and search, in scratch that is made once."""
+"""The safe area C of a scene (Table I): triangulation around the vehicles, then search, in preallocated scratch."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from shared_control_env.core.risk.triangulation import MAX_HOLES, MAX_TRIANGLES
 _SEARCH = np.dtype(
     [(name, array.dtype, array.shape) for name, array in new_scratch(MAX_TRIANGLES)._asdict().items()], align=True
 )
-"""Arrays of :class:`corridor.Scratch`."""
+"""Structured type with the arrays of :class:`corridor.Scratch`."""
 
 
 class Finding:
-    """Scratch of the search for one scene's safe area.
+    """Scratch memory for finding one scene's safe area.
 
     Attributes:
-        triangles: of the triangulation.
+        triangles: scratch and result of the triangulation.
         search: arrays of :class:`corridor.Scratch`.
-        corners: of the vehicles in the driving region, (s, d) [m].
+        corners: corners of the vehicles in the driving region, (s, d) [m].
     """
 
     triangles: triangulation.Workspace
@@ -39,26 +39,26 @@ FINDING = record_dtype(Finding)
 
 
 def triangulate(scene: Scene, count: int, work: Finding) -> int:
-    """:func:`triangulation.triangulate` of a scene, the triangles left in ``work.triangles``.
+    """Triangulate the driving region of a scene by :func:`triangulation.triangulate`.
 
     Args:
         scene: record of :data:`records.SCENE`.
-        count: vehicles in the region; ``work.corners`` holds their corners.
-        work: record of :data:`FINDING`.
+        count: number of vehicles in the region; ``work.corners`` holds their corners.
+        work: record of :data:`FINDING`; the triangles are written to ``work.triangles``.
 
     Returns:
-        How many; none at all where that gives up, so that the area is blocked.
+        Number of triangles; 0 if the triangulation fails, so that the area counts as blocked.
     """
     return max(0, triangulation.triangulate(scene.region, work.corners, count, work.triangles))
 
 
 def search(scene: Scene, p: Parameters, n: int, work: Finding) -> None:
-    """Safe area through the first n triangles of ``work.triangles`` by :func:`corridor.search_triangles`.
+    """Find the safe area from the first n triangles of ``work.triangles`` by :func:`corridor.search_triangles`.
 
     Args:
-        scene: record of :data:`records.SCENE`; its area is written.
+        scene: record of :data:`records.SCENE`; its safe area is written.
         p: parameters.
-        n: triangles.
+        n: number of triangles.
         work: record of :data:`FINDING`.
     """
     triangles, w = work.triangles.triangles[:n], work.search
@@ -67,21 +67,21 @@ def search(scene: Scene, p: Parameters, n: int, work: Finding) -> None:
 
 
 TRIANGULATE = Interface(int, Scene, int, Finding)
-"""``triangulate(scene, count, work)``, compiled apart from the loop."""
+"""``triangulate(scene, count, work) -> n``, compiled separately from the loop."""
 
 SEARCH = Interface(None, Scene, Parameters, int, Finding)
-"""``search(scene, p, n, work)``, compiled apart from the loop."""
+"""``search(scene, p, n, work)``, compiled separately from the loop."""
 
 _triangulate, _search = TRIANGULATE.call, SEARCH.call
 
 
 @jit_inlined
 def find_area(count: int, scene: Scene, p: Parameters, triangulate_at: int, search_at: int, work: Finding) -> None:
-    """Safe area of a scene around the vehicles in its driving region.
+    """Find the safe area of a scene, which excludes the vehicles in the driving region.
 
     Args:
-        count: how many there are, at most MAX_HOLES; ``work.corners`` holds their corners.
-        scene: record of :data:`records.SCENE`; its area is written.
+        count: number of vehicles in the region, at most MAX_HOLES; ``work.corners`` holds their corners.
+        scene: record of :data:`records.SCENE`; its safe area is written.
         p: parameters.
         triangulate_at, search_at: addresses of the compiled functions.
         work: record of :data:`FINDING`.

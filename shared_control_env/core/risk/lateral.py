@@ -14,12 +14,12 @@ from shared_control_env.core.risk.safe_area import boundary_distance, boundary_o
 def boundary_field(r_b: float, parameters: LateralRiskParameters) -> float:
     """Potential field of the boundaries, Eq. 2.
 
-    ``P^r = alpha_f exp(-r_b^2 / sigma_y^2)`` for ``r_b <= d_c + v_w / 2``, else 0. The print has r_i in the exponent;
-    it is r_b. The field jumps by 0.039 alpha_f at the cut-off; the printed form is kept for the risk.
+    ``P^r = alpha_f exp(-r_b^2 / sigma_y^2)`` for ``r_b <= d_c + v_w / 2``, else 0. The paper prints r_i in the
+    exponent, which must be r_b. The field jumps by 0.039 alpha_f at the cut-off; the risk keeps the printed form.
 
     Args:
         r_b: distance to the nearer boundary [m].
-        parameters: of the field.
+        parameters: parameters of the field.
 
     Returns:
         Field value [-].
@@ -33,12 +33,12 @@ def boundary_field(r_b: float, parameters: LateralRiskParameters) -> float:
 def continuous_field(
     area: SafeArea, s: float, d: float, parameters: LateralRiskParameters
 ) -> tuple[float, float, float]:
-    """Eq. 2 less its value at the cut-off, so that a controller's cost is continuous; outside C its peak.
+    """Eq. 2 minus its value at the cut-off, which makes a controller's cost continuous; outside C the field's peak.
 
     Args:
         area: record of :data:`records.SAFE_AREA`.
         s, d: position in the road frame [m].
-        parameters: of the field.
+        parameters: parameters of the field.
 
     Returns:
         Field value [-] and its derivatives with respect to s and d [1/m].
@@ -60,10 +60,10 @@ def lateral_risk(area: SafeArea, s: float, d: float, parameters: LateralRiskPara
     Args:
         area: record of :data:`records.SAFE_AREA`.
         s, d: predicted position in the road frame [m].
-        parameters: of the field.
+        parameters: parameters of the field.
 
     Returns:
-        Risk in [0, 1].
+        Risk in [0, 1] [-].
     """
     r_b = boundary_distance(area, s, d)
     return max(0.0, boundary_field(r_b, parameters) / parameters.alpha_f)

@@ -7,20 +7,20 @@ from math import cos, sin
 from shared_control_env.core.compile.jit import jit
 
 _SERIES_BELOW = 1e-2
-"""|theta| under which the series replace the quotients; their first left-out term is then below 1e-16."""
+"""|theta| below which series replace the quotients [rad]; the first neglected term is then below 1e-16."""
 
 
 @jit
 def turn_integrals(theta: float) -> tuple[float, float, float, float]:
-    """Means of the unit turn, smooth through ``theta = 0``.
+    """Integrals over a unit turn, smooth through ``theta = 0``.
 
     ::
 
         c0 = int_0^1 cos(theta u) du     s0 = int_0^1 sin(theta u) du
         c1 = int_0^1 u cos(theta u) du   s1 = int_0^1 u sin(theta u) du
 
-    Eq. 1 prints them multiplied out and divided by r^2, which is 0/0 on a straight; near zero their
-    Taylor series are used.
+    Eq. 1 prints these integrals multiplied out and divided by r^2, which is 0/0 on a straight road. Near zero their
+    Taylor series are used instead.
 
     Args:
         theta: angle turned over the horizon [rad].
@@ -49,7 +49,7 @@ def ctra(
 
         dx = int_0^tau (v + a t) cos(psi + r t) dt      dy = int_0^tau (v + a t) sin(psi + r t) dt
 
-    A braking vehicle stops and stays: the integral ends at ``-v/a`` when that comes before tau.
+    A braking vehicle stops and remains at rest: the integral ends at the time ``-v/a`` if that is less than tau.
 
     Args:
         x, y: position [m].

@@ -1,10 +1,10 @@
-"""The safe area C in the road frame (s, d): what it is where nothing is in the way, and questions about it.
+"""The safe area C in the road frame (s, d): its form without vehicles in the region, and geometric queries.
 
-The driving region is the rectangle of road ahead, from the ego to d_o behind the preceding vehicle or
-to a fixed look-ahead; vehicles inside are holes. Its triangles (:mod:`triangulation`) are searched from the ego's to
-the final region (:mod:`corridor`); the sequence found is C, and its left and right edges are the upper and lower
-boundary. Working in the road frame makes a curve a rectangle too; it neglects the bending of the road within
-one vehicle length (5 cm at a radius of 60 m).
+The driving region is the rectangle of road ahead, from the ego to d_o behind the preceding vehicle or to a fixed
+look-ahead. Vehicles inside the region are holes. The region is triangulated (:mod:`triangulation`), and its triangles
+are searched from that of the ego to the final region (:mod:`corridor`). The sequence of triangles found is C; its left
+and right edges are the upper and lower boundary. In the road frame the region is a rectangle on a curve as well. This
+neglects the curvature of the road within one vehicle length (5 cm at a radius of 60 m).
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ REACHED, BLOCKED = 0, 1
 """Outcomes of the search: the final region was found, or no passage as wide as the vehicle leads to it."""
 
 ON_LINE = 1e-9
-"""Distance under which a vertex lies on the rear or front line of the region [m]."""
+"""Distance below which a vertex counts as lying on the rear or front line of the region [m]."""
 
 
 @jit
 def is_whole(count: int, region: np.ndarray, min_width: float) -> bool:
-    """Whether the safe area is the whole driving region, whatever its triangles.
+    """Whether the safe area is the whole driving region, so that no triangulation is needed.
 
     Args:
-        count: vehicles in the region.
-        region: start, end along the road and low, high across it [m], shape (4,).
-        min_width: narrowest passage that counts as one [m].
+        count: number of vehicles in the region.
+        region: start, end along the road and low, high across the road [m], shape (4,).
+        min_width: smallest width of a passage [m].
     """
     return count == 0 and region[3] - region[2] >= min_width
 
 
 @jit_inlined
 def whole_region(region: np.ndarray, area: SafeArea) -> None:
-    """Safe area where :func:`is_whole`: the driving region itself.
+    """Make the whole driving region the safe area, for regions where :func:`is_whole` holds.
 
     Args:
-        region: start, end along the road and low, high across it [m], shape (4,).
+        region: start, end along the road and low, high across the road [m], shape (4,).
         area: record of :data:`records.SAFE_AREA`, written.
     """
     for k in range(MAX_CHAIN):
@@ -50,10 +50,10 @@ def whole_region(region: np.ndarray, area: SafeArea) -> None:
 
 @jit
 def _on_open_end(area: SafeArea, s: float) -> float:
-    """Path length clamped to the area's open ends: behind the ego, and at the final region where that was reached.
+    """Path length clamped to the open ends of the area: the line behind the ego, and the front line if it was reached.
 
-    Both are lines across the road, not boundaries; the boundaries count as going straight on there.
-    What lies beyond a blocked end stays outside.
+    Both are lines across the road and not boundaries; the boundaries are extended straight beyond them. Points beyond
+    a blocked end remain outside the area.
     """
     if area.outcome == REACHED:
         s = min(s, area.end - ON_LINE)
@@ -62,7 +62,12 @@ def _on_open_end(area: SafeArea, s: float) -> float:
 
 @jit_inlined
 def _scan_chain(chain: np.ndarray, s: float, d: float) -> tuple[int, float, float, float]:
-    """Segments of a chain above a point, for the even-odd rule; its squared distance, and the vector from there."""
+    """Compare a point with a chain of vertices.
+
+    Returns:
+        Number of the chain's segments above the point, for the even-odd rule; squared distance from the chain to the
+        point [m^2]; s and d components of the vector from the nearest point of the chain [m].
+    """
     above, best, best_s, best_d = 0, np.inf, 0.0, 0.0
     for k in range(MAX_CHAIN - 1):
         es, ed = chain[k + 1, 0] - chain[k, 0], chain[k + 1, 1] - chain[k, 1]
@@ -85,14 +90,14 @@ def _scan_chain(chain: np.ndarray, s: float, d: float) -> tuple[int, float, floa
 
 @jit
 def boundary_offset(area: SafeArea, s: float, d: float) -> tuple[float, float, float]:
-    """Squared distance from a point to the nearer boundary of C, and the vector from there; zeros outside C.
+    """Squared distance from a point to the nearer boundary of C, and the vector between them; zeros outside C.
 
     Args:
         area: record of :data:`records.SAFE_AREA`.
-        s, d: the point [m].
+        s, d: position of the point in the road frame [m].
 
     Returns:
-        Squared distance [m^2]; s and d components of the vector [m].
+        Squared distance [m^2]; s and d components of the vector from the boundary to the point [m].
     """
     s = _on_open_end(area, s)
     above_lower, square, ds, dd = _scan_chain(area.lower, s, d)
@@ -106,20 +111,25 @@ def boundary_offset(area: SafeArea, s: float, d: float) -> tuple[float, float, f
 
 @jit
 def boundary_distance(area: SafeArea, s: float, d: float) -> float:
-    """Distance r_b from a point to the nearer boundary of C [m]; 0 outside C. Arguments as :func:`boundary_offset`."""
+    """Distance r_b from a point to the nearer boundary of C [m]; 0 outside C.
+
+    Args:
+        area: record of :data:`records.SAFE_AREA`.
+        s, d: position of the point in the road frame [m].
+    """
     return boundary_offset(area, s, d)[0] ** 0.5
 
 
 @jit
 def lateral_bounds(area: SafeArea, s: float) -> tuple[float, float]:
-    """Lateral extent of C at path length s: the lowest upper and the highest lower boundary there.
+    """Lateral extent of C at path length s, from the highest lower boundary to the lowest upper boundary.
 
     Args:
         area: record of :data:`records.SAFE_AREA`.
-        s: path length [m]; beyond either end the end counts.
+        s: path length [m]; clamped to the ends of the area.
 
     Returns:
-        ``low, high`` [m].
+        ``low, high``: lateral positions [m].
     """
     s = min(max(s, area.start), area.end - ON_LINE)
     low, high = -np.inf, np.inf

@@ -1,15 +1,16 @@
-"""Constrained Delaunay triangulation of a rectangle less convex holes, compiled (Table I, step 1).
+"""Constrained Delaunay triangulation of a rectangle minus convex holes, compiled (Table I, step 1).
 
-The holes are rotated rectangles that may overlap, touch, or cross the rectangle's border. First the boundary
-of what they leave free is found, as a set of directed edges with the free region on their left: because the
-holes are convex, each covers one interval of any edge, and what no hole covers bounds the free region. Then
-triangles are put on the boundary's edges one after the other (gift wrapping), each with the visible vertex
-that sees its edge under the largest angle, which is the vertex with the empty circumcircle. Every triangle
-replaces its edge by its two others, so the edges always bound what is left to triangulate, and triangles
-cannot overlap however ties and rounding fall.
+The holes are rotated rectangles. They may overlap, touch, or cross the border of the rectangle. The first step finds
+the boundary of the free region, as a set of directed edges with the free region on their left. The holes are convex,
+so each hole covers one interval of any side; the parts of the sides that no hole covers bound the free region.
 
-All lengths are compared with one tolerance, 1e-9 m. It lies far above the rounding of coordinates of 1e3 m
-(1e-13 m), so touching and coincident edges are recognised as such, and far below any length that matters.
+The second step puts triangles on the edges of the boundary, one after the other (gift wrapping). The apex of a triangle
+is the visible vertex that sees the edge under the largest angle, which is the vertex with the empty circumcircle. Each
+triangle replaces its edge by its two other edges. The edges therefore always bound the region that is not yet
+triangulated, and triangles cannot overlap, whatever the ties and the rounding.
+
+All lengths are compared with one tolerance, 1e-9 m. It is far above the rounding error of coordinates of 1e3 m
+(1e-13 m), so touching and coincident edges are recognised. It is far below any length that matters.
 """
 
 from __future__ import annotations
@@ -22,36 +23,37 @@ from shared_control_env.core.compile.jit import jit, jit_inlined
 from shared_control_env.core.records import record_dtype
 
 MAX_HOLES = 8
-"""Most holes in a region."""
+"""Largest number of holes in a region."""
 
 MAX_VERTICES = 160
-"""Most vertices, hidden corners included; eight bars laid as a grid across the border have 132."""
+"""Largest number of vertices, hidden corners included; eight bars laid as a grid across the border have 132."""
 
 MAX_TRIANGLES = MAX_VERTICES + 2 * MAX_HOLES
-"""Most triangles: Euler's formula gives n_vertices - 2 and two for every hole."""
+"""Largest number of triangles: by Euler's formula n_vertices - 2, plus two for every hole."""
 
 MAX_FRONT = 2 * MAX_VERTICES
-"""Most edges of the boundary of what is left to triangulate."""
+"""Largest number of edges of the front, the boundary of the region that is not yet triangulated."""
 
 FAILED = -1
-"""Returned instead of a number of triangles: a capacity was exceeded, or no triangle fits an edge."""
+"""Returned instead of a number of triangles if a capacity is exceeded or if no triangle fits an edge."""
 
 
 class Workspace:
     """Scratch and result of one triangulation.
 
     Attributes:
-        sides: ends of the region's and the holes' sides [m].
-        vertices: (s, d) [m].
-        n_vertices: see above.
-        pieces: uncovered pieces of the sides, vertices from and to.
-        n_pieces: see above.
-        front: boundary of what is left to triangulate, vertices from and to.
-        n_front: see above.
-        cotangents: of the angles under which an edge is seen from the front.
-        covered: intervals of one side that holes cover, in [0, 1].
-        cutters: sides that bound these intervals, or -1 at the side's ends.
-        triangles: the result, counter-clockwise (s, d) [m].
+        sides: end points (s, d) of the sides of the region and of the holes [m].
+        vertices: positions (s, d) of the vertices [m].
+        n_vertices: number of vertices.
+        pieces: pieces of the sides that no hole covers, as indices of their first and last vertex.
+        n_pieces: number of pieces.
+        front: boundary of the region that is not yet triangulated, as indices of the first and last vertex of each
+            edge.
+        n_front: number of edges of the front.
+        cotangents: cotangents of the angles under which the vertices of the front see an edge [-].
+        covered: intervals of one side that holes cover, in [0, 1] [-].
+        cutters: sides that bound these intervals, or -1 at the ends of the side.
+        triangles: the result, counter-clockwise vertices (s, d) [m].
     """
 
     sides: Annotated[np.ndarray, (4 * MAX_HOLES + 4, 2, 2)]
@@ -70,30 +72,31 @@ class Workspace:
 WORKSPACE = record_dtype(Workspace)
 
 _TOLERANCE = 1e-9
-"""Two points this near are one, and a point this near to a line is on it [m]."""
+"""Distance below which two points coincide, and below which a point lies on a line [m]."""
 
 _TIE = 1e-9
-"""Relative difference of the cotangents under which four points count as cocircular."""
+"""Relative difference of the cotangents below which four points count as cocircular [-]."""
 
 
 @jit
 def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: Workspace) -> int:
-    """Constrained Delaunay triangles of a rectangle less its holes (Table I, step 1).
+    """Constrained Delaunay triangulation of a rectangle minus its holes (Table I, step 1).
 
-    The vertices are those of the difference polygon, points on its straight sides where holes touch included.
-    The diagonals among cocircular points are not unique; those taken depend on the order of the holes and of
-    their corners, not on rounding.
+    The vertices are those of the difference polygon, including points on its straight sides where holes touch. The
+    diagonals among cocircular points are not unique. The choice among them depends on the order of the holes and of
+    their corners, and not on rounding.
 
     Args:
-        region: start, end along the road and low, high across it [m], shape (4,).
-        holes: corners in order around convex quadrilaterals of positive area, shape (>= n_holes, 4, 2) [m].
-        n_holes: how many holes there are.
+        region: start, end along the road and low, high across the road [m], shape (4,).
+        holes: corners (s, d) [m] of convex quadrilaterals of positive area, in order around each of them,
+            shape (>= n_holes, 4, 2).
+        n_holes: number of holes.
         work: record of :data:`WORKSPACE`; the triangles are written to ``work.triangles``.
 
     Returns:
-        Number of triangles, 0 when the holes cover the region; FAILED with more than MAX_HOLES holes, when
-        the free region has more than MAX_VERTICES vertices, or when sides that miss each other by about the
-        tolerance (neither touching nor clear of it) leave its boundary open.
+        Number of triangles; 0 if the holes cover the region. FAILED in three cases: there are more than MAX_HOLES
+        holes; the free region has more than MAX_VERTICES vertices; or sides whose distance is about the tolerance
+        (neither touching nor clearly apart) leave the boundary of the free region open.
     """
     if n_holes > MAX_HOLES:
         return FAILED
@@ -120,9 +123,9 @@ def triangulate(region: np.ndarray, holes: np.ndarray, n_holes: int, work: Works
 
 @jit_inlined
 def _lay_sides(region: np.ndarray, holes: np.ndarray, n_holes: int, work: Workspace) -> None:
-    """Sides of the region, then of the holes, four each, with the free region on their left.
+    """Write the sides of the region and then of the holes, four each, with the free region on their left.
 
-    All corners become vertices, to split coincident sides at; those inside holes do no harm.
+    All corners become vertices, at which coincident sides can be split. Corners inside holes do no harm.
     """
     sides = work.sides
     work.n_vertices = 0
@@ -143,9 +146,9 @@ def _lay_sides(region: np.ndarray, holes: np.ndarray, n_holes: int, work: Worksp
 
 @jit
 def _offset(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> float:
-    """Distance of p to the left of the line from a to b [m], over by up to sqrt(2) short of a square root.
+    """Approximate distance of p to the left of the line from a to b [m]; exactly 0 if p is a or b.
 
-    It is exactly 0 where p is a or b.
+    The magnitude is too small by a factor of up to sqrt(2), since the sum of absolute values replaces the square root.
     """
     es, ed = b[0] - a[0], b[1] - a[1]
     return (es * (p[1] - a[1]) - ed * (p[0] - a[0])) / (abs(es) + abs(ed))
@@ -153,7 +156,7 @@ def _offset(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> float:
 
 @jit
 def _vertex(work: Workspace, s: float, d: float) -> int:
-    """Vertex at a point, a new one unless one is there; -1 when there is no room."""
+    """Index of the vertex at a point, which is added unless it exists; -1 if there is no room for another vertex."""
     vertices, n = work.vertices, work.n_vertices
     for i in range(n):
         if abs(vertices[i, 0] - s) < _TOLERANCE and abs(vertices[i, 1] - d) < _TOLERANCE:
@@ -167,13 +170,13 @@ def _vertex(work: Workspace, s: float, d: float) -> int:
 
 @jit
 def _inside(sides: np.ndarray, e: int, polygon: int) -> tuple[float, float, int, int]:
-    """Part of a side inside the region (polygon 0) or a hole (Cyrus & Beck's clipping).
+    """Part of a side that lies inside the region (polygon 0) or inside a hole, by Cyrus-Beck clipping.
 
-    Of coincident sides one remains: none where holes lie on either side, otherwise that of the lower index.
+    Of coincident sides, the side with the lower index remains. None remains if there are holes on both of its sides.
 
     Returns:
-        Where the part begins and ends, in [0, 1], and the sides that it is cut at, or -1; an empty part
-        does not end after it begins.
+        Start and end of the part, in [0, 1], and the sides at which the part is cut, or -1. For an empty part the end
+        is not greater than the start.
     """
     first, last, first_cut, last_cut = 0.0, 1.0, -1, -1
     inward = 1.0 if polygon == 0 else -1.0
@@ -197,7 +200,7 @@ def _inside(sides: np.ndarray, e: int, polygon: int) -> tuple[float, float, int,
 
 @jit_inlined
 def _covered_parts(n_sides: int, e: int, work: Workspace) -> int:
-    """Parts of a side that other holes cover, into ``work.covered`` sorted by where they begin; how many."""
+    """Write the parts of a side that other holes cover to ``work.covered``, sorted by their start; return their number."""
     covered, cutters = work.covered, work.cutters
     count = 0
     for hole in range(1, n_sides // 4):
@@ -219,7 +222,7 @@ def _covered_parts(n_sides: int, e: int, work: Workspace) -> int:
 
 @jit_inlined
 def _find_pieces(n_sides: int, work: Workspace) -> bool:
-    """Pieces of all sides that lie in the region and that no hole covers; False when there is no room."""
+    """Find the pieces of all sides that lie in the region and that no hole covers; False if there is no room."""
     work.n_pieces = 0
     covered, cutters = work.covered, work.cutters
     for e in range(n_sides):
@@ -242,7 +245,7 @@ def _find_pieces(n_sides: int, work: Workspace) -> bool:
 
 @jit
 def _add_piece(work: Workspace, e: int, first_cut: int, last_cut: int) -> bool:
-    """Add the piece of a side between two others, or its ends (-1); False when there is no room."""
+    """Add the piece of a side between two other sides, or up to its ends (-1); False if there is no room."""
     a = _cut_vertex(work, e, first_cut, 0)
     b = _cut_vertex(work, e, last_cut, 1)
     if a < 0 or b < 0 or work.n_pieces == MAX_FRONT:
@@ -255,10 +258,10 @@ def _add_piece(work: Workspace, e: int, first_cut: int, last_cut: int) -> bool:
 
 @jit
 def _cut_vertex(work: Workspace, e: int, cut: int, end: int) -> int:
-    """Vertex where a side is cut by another, or at its end 0 or 1 where that is -1.
+    """Vertex where another side cuts a side; where that other side is -1, the vertex at end 0 or 1 of the side.
 
-    The point is computed in the same way whichever of the two sides is cut: sides that are almost parallel
-    would else disagree on it. It is computed along the lower side, so that it lies on the border exactly.
+    The point is computed in the same way for both sides. Otherwise two almost parallel sides would give different
+    points. The point is computed along the side of lower index, so that it lies exactly on the border of the region.
     """
     sides = work.sides
     if cut < 0:
@@ -274,7 +277,7 @@ def _cut_vertex(work: Workspace, e: int, cut: int, end: int) -> int:
 
 @jit_inlined
 def _close_boundary(work: Workspace) -> bool:
-    """Make the pieces the front, split at the vertices that lie on them; False when there is no room."""
+    """Make the pieces the front, split at the vertices that lie on them; False if there is no room."""
     work.n_front = 0
     for i in range(work.n_pieces):
         a, b = work.pieces[i, 0], work.pieces[i, 1]
@@ -291,7 +294,7 @@ def _close_boundary(work: Workspace) -> bool:
 
 @jit
 def _next_on_piece(vertices: np.ndarray, n_vertices: int, a: int, b: int) -> int:
-    """First vertex on the way from vertex a to vertex b, b included."""
+    """First vertex on the straight way from vertex a to vertex b, b included."""
     es, ed = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1]
     nearest, least = b, es * es + ed * ed
     for i in range(n_vertices):
@@ -305,7 +308,7 @@ def _next_on_piece(vertices: np.ndarray, n_vertices: int, a: int, b: int) -> int
 
 @jit
 def _put_edge(work: Workspace, a: int, b: int) -> None:
-    """Put an edge into the front; if its reverse is there the two enclose nothing, and both go."""
+    """Add an edge to the front. If the front holds the reversed edge, both enclose nothing, and that edge is removed."""
     front, n = work.front, work.n_front
     for i in range(n):
         if front[i, 0] == b and front[i, 1] == a:
@@ -318,10 +321,10 @@ def _put_edge(work: Workspace, a: int, b: int) -> None:
 
 @jit_inlined
 def _apex(work: Workspace, a: int, b: int) -> int:
-    """Visible vertex that sees an edge from its left under the largest angle, or -1.
+    """Visible vertex on the left of an edge that sees the edge under the largest angle, or -1.
 
-    Angles are compared by their cotangents, which fall from inf to -inf as the angle grows. Visibility takes
-    longest to find, so it is asked for the largest angle first.
+    Angles are compared by their cotangents, which decrease from inf to -inf as the angle grows. The test of visibility
+    takes the most time, so it is made for the largest angle first.
     """
     front, cotangents = work.front, work.cotangents
     _rate(work, a, b)
@@ -339,9 +342,9 @@ def _apex(work: Workspace, a: int, b: int) -> int:
 
 @jit
 def _rate(work: Workspace, a: int, b: int) -> None:
-    """Cotangent of the angle under which the first vertex of each edge of the front sees an edge, into ``work``.
+    """Write the cotangents of the angles under which the vertices of the front see an edge to ``work.cotangents``.
 
-    It is inf unless the vertex lies on the left.
+    Each edge of the front stands for its first vertex. The cotangent is inf unless the vertex lies to the left.
     """
     front, vertices = work.front, work.vertices
     a_s, a_d, b_s, b_d = vertices[a, 0], vertices[a, 1], vertices[b, 0], vertices[b, 1]
@@ -355,9 +358,9 @@ def _rate(work: Workspace, a: int, b: int) -> None:
 
 @jit
 def _visible(vertices: np.ndarray, front: np.ndarray, n_front: int, a: int, b: int, c: int) -> bool:
-    """Whether no edge of the front crosses the way from vertex c to a or to b.
+    """Whether no edge of the front crosses the line of sight from vertex c to a or to b.
 
-    An edge that only touches it is no crossing: the vertex that touches sees a and b under a larger angle.
+    An edge that only touches a line of sight does not cross it: the touching vertex sees a and b under a larger angle.
     """
     least = min(vertices[a, 0], vertices[b, 0], vertices[c, 0])
     most = max(vertices[a, 0], vertices[b, 0], vertices[c, 0])
@@ -372,7 +375,7 @@ def _visible(vertices: np.ndarray, front: np.ndarray, n_front: int, a: int, b: i
 
 @jit
 def _crosses(u: np.ndarray, v: np.ndarray, p: np.ndarray, q: np.ndarray) -> bool:
-    """Whether two segments cross, each with its ends clear of the other."""
+    """Whether two segments cross, with the ends of each clearly on both sides of the other."""
     at_p, at_q = _offset(u, v, p), _offset(u, v, q)
     if not ((at_p > _TOLERANCE and at_q < -_TOLERANCE) or (at_p < -_TOLERANCE and at_q > _TOLERANCE)):
         return False
@@ -381,20 +384,19 @@ def _crosses(u: np.ndarray, v: np.ndarray, p: np.ndarray, q: np.ndarray) -> bool
 
 
 def triangulate_any(region: np.ndarray, holes: np.ndarray) -> np.ndarray:
-    """Constrained Delaunay triangles of a rectangle less its holes (Table I, step 1), by shapely.
+    """Constrained Delaunay triangulation of a rectangle minus its holes (Table I, step 1), by shapely.
 
-    For more holes than :func:`triangulate` takes, and to test that one.
-
-    Shapely raises when holes overlap or cross the shell, so their union is subtracted first.
+    It serves regions with more holes than :func:`triangulate` accepts, and tests of that function. Shapely raises an
+    error when holes overlap or cross the shell, so the union of the holes is subtracted from the rectangle first.
 
     Args:
-        region: start, end along the road and low, high across it [m], shape (4,).
-        holes: corners of the vehicles, shape (n, 4, 2) [m].
+        region: start, end along the road and low, high across the road [m], shape (4,).
+        holes: corners (s, d) of the vehicles [m], shape (n, 4, 2).
 
     Returns:
-        Triangles, shape (m, 3, 2); m = 0 when the holes cover the region.
+        Triangles, vertices (s, d) [m], shape (m, 3, 2); m = 0 if the holes cover the region.
     """
-    import shapely  # seldom needed, and slow to import
+    import shapely  # rarely needed, and slow to import
 
     start, end, low, high = region.tolist()
     free = shapely.box(start, low, end, high)

@@ -1,1 +1,1 @@
-"""What drives and where: the car, the road, the other vehicles, and the scene that sensors give of them."""
+"""The simulated world: the car, the road, the other vehicles, and the scene that sensors perceive of them."""

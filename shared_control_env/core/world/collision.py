@@ -12,7 +12,7 @@ from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, X,
 
 @jit
 def _separated(row: np.ndarray, other: np.ndarray, dx: float, dy: float, c: float, s: float) -> bool:
-    """Whether an axis of the first vehicle separates the two; c and s are of the angle between them, absolute."""
+    """Whether an axis of the first vehicle separates both; c, s: absolute cosine and sine of the angle between them."""
     ct, st = cos(row[HEADING]), sin(row[HEADING])
     along, across = abs(dx * ct + dy * st), abs(dy * ct - dx * st)
     return along > 0.5 * (row[BODY_LENGTH] + c * other[BODY_LENGTH] + s * other[BODY_WIDTH]) or across > 0.5 * (
@@ -25,7 +25,7 @@ def overlap(first: np.ndarray, second: np.ndarray) -> bool:
     """Whether two vehicles' rectangles overlap, by the separating axes of both.
 
     Args:
-        first, second: rows of :mod:`records`' traffic columns, shape (8,).
+        first, second: the vehicles' rows of the traffic array, columns as in :mod:`records`, shape (8,).
     """
     dx, dy = second[X] - first[X], second[Y] - first[Y]
     reach = hypot(first[BODY_LENGTH], first[BODY_WIDTH]) + hypot(second[BODY_LENGTH], second[BODY_WIDTH])
@@ -41,11 +41,11 @@ def find_collisions(vehicles: np.ndarray, crashed: np.ndarray) -> bool:
     """Mark every vehicle that overlaps another.
 
     Args:
-        vehicles: rows of the traffic columns, shape (n, 8).
-        crashed: set to true where so, shape (n,).
+        vehicles: traffic array, columns as in :mod:`records`, shape (n, 8).
+        crashed: set to True for each vehicle that overlaps another, shape (n,).
 
     Returns:
-        Whether any was marked.
+        Whether any vehicle was marked.
     """
     found = False
     n = vehicles.shape[0]

@@ -1,9 +1,9 @@
 """The road's reference line: straights and arcs, and the road frame ``(s, d)`` along it.
 
-A line is an array of segments, one row ``[s0, x0, y0, psi0, kappa, length]`` each: where it begins,
-as path length and pose, its curvature (positive to the left) and its length. Rows that begin at infinity
-fill an array up and are no segments. ``d`` is the offset to the left of the line. Lanes are the line shifted
-by their ``d``.
+A line is an array of segments, one row ``[s0, x0, y0, psi0, kappa, length]`` per segment. A row holds the path length
+and the pose at the start of the segment [m, m, m, rad], the curvature (positive to the left) [1/m] and the length [m].
+Rows with an infinite ``s0`` only fill up the array; they are not segments. ``d`` is the offset to the left of the line.
+The centre of a lane is the line shifted by the lane's ``d``.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ import numpy as np
 from shared_control_env.core.compile.jit import jit
 
 S0, X0, Y0, PSI0, KAPPA, LENGTH = range(6)
-"""Places in a segment's row."""
+"""Indices in a segment's row."""
 
 MAX_ARC = pi / 2
-"""Longest arc of one segment [rad]: highway-env's CircularLane wraps after half a turn."""
+"""Largest angle of one arc segment [rad]: the angles of highway-env's CircularLane wrap after half a turn."""
 
 
 def reference_line(segments: Sequence[tuple[float, float]], lead_in: float = 0.0) -> np.ndarray:
     """Chain ``(length, curvature)`` pairs into a line that passes the origin along x at s = 0.
 
     Args:
-        segments: pairs of length [m] and curvature [1/m], from s = 0 on.
-        lead_in: length of a straight before s = 0 [m].
+        segments: pairs of length [m] and curvature [1/m], starting at s = 0.
+        lead_in: length of a straight segment before s = 0 [m].
 
     Returns:
-        Array of shape (n, 6); arcs longer than :data:`MAX_ARC` are split.
+        Reference line, shape (n, 6); arcs longer than :data:`MAX_ARC` are split.
     """
     rows: list[list[float]] = []
     s = x = -lead_in
@@ -46,7 +46,12 @@ def reference_line(segments: Sequence[tuple[float, float]], lead_in: float = 0.0
 
 @jit
 def segment_at(line: np.ndarray, s: float) -> int:
-    """Index of the segment that holds the path length s [m]; the end segments reach beyond the line."""
+    """Index of the segment that contains a path length; the first and the last segment extend beyond the line.
+
+    Args:
+        line: reference line, shape (n, 6).
+        s: path length [m].
+    """
     i = 0
     while i + 1 < line.shape[0] and s >= line[i + 1, S0]:
         i += 1
@@ -55,7 +60,13 @@ def segment_at(line: np.ndarray, s: float) -> int:
 
 @jit
 def curvature_at(line: np.ndarray, s: float, d: float) -> float:
-    """Curvature [1/m] of the line shifted by d [m] to the left, at path length s [m]."""
+    """Curvature of the shifted reference line [1/m].
+
+    Args:
+        line: reference line, shape (n, 6).
+        s: path length along the unshifted line [m].
+        d: shift to the left [m].
+    """
     kappa = line[segment_at(line, s), KAPPA]
     return kappa / (1.0 - kappa * d)
 
@@ -69,7 +80,7 @@ def point_at(line: np.ndarray, s: float, d: float) -> tuple[float, float, float]
         s, d: path length and offset to the left [m].
 
     Returns:
-        ``x, y, psi_road``.
+        ``x, y, psi_road``: position [m] and road heading [rad].
     """
     row = line[segment_at(line, s)]
     along, kappa, psi0 = s - row[S0], row[KAPPA], row[PSI0]
@@ -83,7 +94,7 @@ def point_at(line: np.ndarray, s: float, d: float) -> tuple[float, float, float]
 
 @jit
 def _project(row: np.ndarray, x: float, y: float) -> tuple[float, float]:
-    """Path length from the segment's start and offset to the left of a point, beyond its ends too."""
+    """Path length from a segment's start, and offset to the left, of a point; the segment extends beyond its ends."""
     c, sn = cos(row[PSI0]), sin(row[PSI0])
     along = c * (x - row[X0]) + sn * (y - row[Y0])
     across = -sn * (x - row[X0]) + c * (y - row[Y0])
@@ -98,14 +109,14 @@ def _project(row: np.ndarray, x: float, y: float) -> tuple[float, float]:
 
 @jit
 def locate(line: np.ndarray, x: float, y: float) -> tuple[float, float, float, float]:
-    """Road-frame coordinates of a point: the nearest of the segments' projections.
+    """Road-frame coordinates of a point, by projection onto the nearest segment.
 
     Args:
         line: reference line, shape (n, 6).
         x, y: Cartesian position [m].
 
     Returns:
-        ``s, d`` [m], road heading [rad] and the line's curvature [1/m] there.
+        ``s, d`` [m], and the heading [rad] and curvature [1/m] of the line at s.
     """
     n = line.shape[0]
     best = np.inf
@@ -125,5 +136,9 @@ def locate(line: np.ndarray, x: float, y: float) -> tuple[float, float, float, f
 
 @jit
 def wrap_angle(angle: float) -> float:
-    """The angle in [-pi, pi)."""
+    """Wrap an angle to [-pi, pi).
+
+    Args:
+        angle: angle [rad].
+    """
     return (angle + pi) % (2.0 * pi) - pi

@@ -1,4 +1,4 @@
-"""From poses and speeds to the scene: road frame, neighbours, driving region, targets and preview."""
+"""Perception of the scene from poses and speeds: road frame, neighbours, driving region, targets and preview."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from shared_control_env.core.world.lane_change import change_progress
 from shared_control_env.core.world.road import curvature_at, locate, wrap_angle
 
 _SHORTEST_REGION = 0.5
-"""Length kept of a driving region when the preceding vehicle is all but touched [m]."""
+"""Smallest length of the driving region [m], used when the preceding vehicle is almost touched."""
 
 
 @jit_inlined
 def road_frame(line: np.ndarray, state: np.ndarray, z: np.ndarray) -> None:
-    """State in the road frame.
+    """Transform the ego state from the Cartesian frame to the road frame.
 
     Args:
         line: reference line, shape (n, 6).
-        state: Cartesian ``[x, y, psi, v_x, v_y, r]``, shape (6,).
-        z: ``[s, y, psi - psi_road, v_x, v_y, r]``, written, shape (6,).
+        state: Cartesian state ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (6,).
+        z: state ``[s, y, psi - psi_road, v_x, v_y, r]`` in the road frame, written, shape (6,).
     """
     s, d, psi_road, _ = locate(line, state[0], state[1])
     z[0], z[1], z[2] = s, d, wrap_angle(state[2] - psi_road)
@@ -48,7 +48,7 @@ def road_frame(line: np.ndarray, state: np.ndarray, z: np.ndarray) -> None:
 
 @jit
 def _keep_nearest(neighbours: np.ndarray, which: int, row: int, s: float, d: float, v: float, s_e: float) -> None:
-    """Record a vehicle as a neighbour unless a nearer one is recorded."""
+    """Record a vehicle as a neighbour, unless a nearer vehicle is already recorded."""
     near = neighbours[which]
     if near[PRESENT] == 0.0 or abs(s - s_e) < abs(near[NEAR_S] - s_e):
         near[PRESENT], near[NEAR_S], near[NEAR_D], near[NEAR_SPEED], near[NEAR_ROW] = 1.0, s, d, v, row
@@ -58,17 +58,18 @@ def _keep_nearest(neighbours: np.ndarray, which: int, row: int, s: float, d: flo
 def find_neighbours(
     line: np.ndarray, traffic: np.ndarray, s_e: float, y_target: float, lane_width: float, neighbours: np.ndarray
 ) -> None:
-    """Preceding vehicle in the lane to keep; leader and follower in the lanes beside it.
+    """Find the preceding vehicle in the lane to keep, and the leader and the follower in the adjacent lanes.
 
-    A vehicle counts to the lane its centre is in. Positions are those of the centres.
+    A vehicle belongs to the lane that contains its centre. Positions are those of the centres.
 
     Args:
-        line: reference line.
-        traffic: rows of :mod:`records`' traffic columns, shape (n, 8).
+        line: reference line, shape (m, 6).
+        traffic: other vehicles, columns as in :mod:`records`, shape (n, 8).
         s_e: the ego's path length [m].
-        y_target: centre of the lane to keep [m].
-        lane_width: [m].
-        neighbours: written, shape (3, 5).
+        y_target: lateral position of the centre of the lane to keep [m].
+        lane_width: width of a lane [m].
+        neighbours: rows of follower, leader and preceding vehicle, columns PRESENT to NEAR_ROW of :mod:`records`,
+            written, shape (3, 5).
     """
     for which in range(3):
         neighbours[which, PRESENT] = 0.0
@@ -85,21 +86,21 @@ def find_neighbours(
 
 @jit
 def following_speed(v_lead: float, gap: float, v: float, task: TaskParameters) -> float:
-    """Target speed behind a vehicle [m/s]: its own, or the one that brings the gap to a time headway.
+    """Target speed behind a vehicle [m/s]: the vehicle's speed, or the speed that brings the gap to a time headway.
 
     ::
 
-        v_target = v_lead                                      as the paper has it ("drive consistently")
+        v_target = v_lead                                      as in the paper ("drive consistently")
         v_target = v_lead + (gap - d_0 - tau_h v) / tau_g      with a time headway tau_h
 
-    within 0 and the task's target speed; a constant time gap (Ioannou & Chien, Autonomous Intelligent Cruise Control,
-    IEEE Transactions on Vehicular Technology 42(4), 1993).
+    The result is clipped to the range from 0 to the task's target speed. The second line is a constant-time-gap law
+    (Ioannou & Chien, Autonomous Intelligent Cruise Control, IEEE Transactions on Vehicular Technology 42(4), 1993).
 
     Args:
         v_lead: speed of the vehicle ahead along the road [m/s].
-        gap: to it, bumper to bumper [m].
+        gap: gap to the vehicle ahead, bumper to bumper [m].
         v: own speed [m/s].
-        task: headway, standstill gap d_0, closing time tau_g and target speed.
+        task: time headway tau_h, standstill gap d_0, closing time tau_g and target speed.
     """
     v_target = v_lead
     if task.time_headway > 0.0:
@@ -109,7 +110,7 @@ def following_speed(v_lead: float, gap: float, v: float, task: TaskParameters) -
 
 @jit
 def gap_ahead(scene: Scene) -> float:
-    """Gap to the preceding vehicle, bumper to bumper [m]; infinite without one.
+    """Gap to the preceding vehicle, bumper to bumper [m]; infinite without a preceding vehicle.
 
     Args:
         scene: record of :data:`records.SCENE`.
@@ -120,18 +121,18 @@ def gap_ahead(scene: Scene) -> float:
 
 @jit
 def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p: Parameters, scene: Scene) -> None:
-    """Fill the scene at one time step, but for its safe area.
+    """Fill the scene at one time step, except for its safe area.
 
-    The target speed is that of :func:`following_speed` behind a vehicle (Section VI: "follow the
-    preceding"). The driving region is the lane to keep, from the ego to d_o behind the preceding
-    vehicle's rear or to the look-ahead (Section III-B). During a lane change it is both lanes, to the look-ahead,
-    with the vehicles as holes; the lane to keep is the old one for its first half and the new one from then on.
+    Behind a vehicle the target speed is that of :func:`following_speed` (Section VI: "follow the preceding"). The
+    driving region is the lane to keep, from the ego to d_o behind the rear of the preceding vehicle, or to the
+    look-ahead (Section III-B). During a lane change the region covers both lanes up to the look-ahead, with the
+    vehicles as holes. The lane to keep is the old lane during the first half of the change, then the new lane.
 
     Args:
         k: time step.
-        state: ego ``[x, y, psi, v_x, v_y, r]``, shape (6,).
+        state: ego ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (6,).
         traffic: other vehicles, shape (n, 8).
-        line: reference line.
+        line: reference line, shape (m, 6).
         p: parameters.
         scene: record of :data:`records.SCENE`, written.
     """
@@ -168,16 +169,16 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
 
 @jit
 def holes_in_region(traffic: np.ndarray, line: np.ndarray, region: np.ndarray, corners: np.ndarray) -> int:
-    """Corners, in the road frame, of the vehicles that reach into the driving region.
+    """Find the corners, in the road frame, of the vehicles that reach into the driving region.
 
     Args:
         traffic: other vehicles, shape (n, 8).
-        line: reference line.
-        region: start, end, low, high [m], shape (4,).
-        corners: written, shape (m, 4, 2); more vehicles than m are left out.
+        line: reference line, shape (l, 6).
+        region: driving region: start, end, low, high [m], shape (4,).
+        corners: corners (s, d) [m] of each vehicle, written, shape (m, 4, 2); further vehicles are left out.
 
     Returns:
-        How many there are.
+        Number of vehicles written, at most m.
     """
     count = 0
     for row in range(traffic.shape[0]):

@@ -1,4 +1,4 @@
-"""Motion of the other vehicles: what each decides, and how it moves along the road."""
+"""Motion of the other vehicles: the acceleration that each one decides on, and its motion along the road."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from shared_control_env.core.world.lane_change import change_progress
 from shared_control_env.core.world.road import locate, point_at
 
 TIME_HEADWAY = 1.5
-"""T of the Intelligent Driver Model [s]; highway-env's IDMVehicle."""
+"""Time headway T of the Intelligent Driver Model [s]; that of highway-env's IDMVehicle."""
 
 STANDSTILL_GAP = 2.0
-"""s_0 [m]; Treiber et al., Table I."""
+"""Gap at standstill s_0 [m]; Treiber et al., Table I."""
 
 LARGEST_ACCELERATION = 1.5
-"""a [m/s^2]; between Treiber et al. (0.73) and highway-env (3 to 6)."""
+"""Largest acceleration a [m/s^2]; between the values of Treiber et al. (0.73) and of highway-env (3 to 6)."""
 
 COMFORTABLE_DECELERATION = 2.0
-"""b [m/s^2]; Treiber et al. 1.67."""
+"""Comfortable deceleration b [m/s^2]; Treiber et al. have 1.67."""
 
 LARGEST_DECELERATION = 8.0
-"""Largest deceleration that following may ask for [m/s^2]; about what a dry road allows."""
+"""Largest deceleration of a following vehicle [m/s^2]; about the limit of a dry road."""
 
 
 @jit
@@ -37,7 +37,7 @@ def idm_acceleration(v: float, v_0: float, gap: float, v_lead: float) -> float:
 
     Args:
         v, v_0: speed and desired speed [m/s].
-        gap: s, bumper to bumper [m]; infinite without a vehicle ahead.
+        gap: gap s to the vehicle ahead, bumper to bumper [m]; infinite without a vehicle ahead.
         v_lead: speed of the vehicle ahead [m/s].
 
     Returns:
@@ -51,7 +51,7 @@ def idm_acceleration(v: float, v_0: float, gap: float, v_lead: float) -> float:
 
 @jit
 def _gap_ahead(row: np.ndarray, s: float, d: float, other: np.ndarray, line: np.ndarray, lane_width: float) -> float:
-    """Distance from a vehicle's front to another's rear [m]; infinite if that is not ahead in the same lane."""
+    """Distance from a vehicle's front to another's rear [m]; infinite if the other is not ahead in the same lane."""
     s_other, d_other, _, _ = locate(line, other[X], other[Y])
     if s_other <= s or abs(d_other - d) > 0.5 * lane_width:
         return np.inf
@@ -62,7 +62,16 @@ def _gap_ahead(row: np.ndarray, s: float, d: float, other: np.ndarray, line: np.
 def follow(
     row: np.ndarray, v_0: float, ego: np.ndarray, traffic: np.ndarray, line: np.ndarray, lane_width: float
 ) -> float:
-    """Acceleration of a vehicle that follows whatever is nearest ahead in its lane, the ego included [m/s^2]."""
+    """Acceleration [m/s^2] of a vehicle that follows the nearest vehicle ahead in its lane, the ego included.
+
+    Args:
+        row: the following vehicle's row of the traffic array, shape (8,).
+        v_0: desired speed [m/s].
+        ego: the ego as a row of the traffic array, shape (8,).
+        traffic: all other vehicles, shape (n, 8).
+        line: reference line, shape (m, 6).
+        lane_width: width of a lane [m].
+    """
     s, d, _, _ = locate(line, row[X], row[Y])
     gap, v_lead = _gap_ahead(row, s, d, ego, line, lane_width), ego[SPEED]
     for i in range(traffic.shape[0]):
@@ -82,16 +91,18 @@ def decide_acceleration(
     line: np.ndarray,
     lane_width: float,
 ) -> None:
-    """Acceleration of a vehicle by its plan, written into its row: following or constant speed; braking comes first.
+    """Write the acceleration of a vehicle, by its plan, into its row.
+
+    The vehicle follows or holds its speed. From the onset of its braking on, it brakes at least as hard as planned.
 
     Args:
-        row: the vehicle, one row of :mod:`records`' traffic columns, shape (8,).
-        plan: what it is going to do.
+        row: the vehicle's row of the traffic array, its acceleration is written, shape (8,).
+        plan: plan of the vehicle.
         t: time [s].
-        ego: the ego as a row, shape (8,).
-        traffic: all other vehicles, itself among them, shape (n, 8).
-        line: reference line.
-        lane_width: [m].
+        ego: the ego as a row of the traffic array, shape (8,).
+        traffic: all other vehicles, this one among them, shape (n, 8).
+        line: reference line, shape (m, 6).
+        lane_width: width of a lane [m].
     """
     row[ACCELERATION] = 0.0
     if plan.follows:
@@ -104,15 +115,15 @@ def decide_acceleration(
 
 @jit
 def follow_lane(row: np.ndarray, line: np.ndarray, dt: float, shift: float) -> None:
-    """Move a vehicle along the road at its acceleration, its offset from the reference line changed by a shift.
+    """Move a vehicle along the road at its acceleration, and change its offset from the reference line by a shift.
 
-    ``s' = v / (1 - kappa d)`` with the mean speed of the step; the yaw rate is that of the path,
-    ``r = v kappa / (1 - kappa d)``. It stops, and does not reverse.
+    ``s' = v / (1 - kappa d)`` with the mean speed of the step. The yaw rate is that of the path,
+    ``r = v kappa / (1 - kappa d)``. The vehicle stops at speed 0 and does not reverse.
 
     Args:
-        row: the vehicle, one row of :mod:`records`' traffic columns, overwritten, shape (8,).
-        line: reference line.
-        dt: time [s].
+        row: the vehicle's row of the traffic array, overwritten, shape (8,).
+        line: reference line, shape (m, 6).
+        dt: step [s].
         shift: change of the offset, positive to the left [m].
     """
     s, d, _, kappa = locate(line, row[X], row[Y])
@@ -127,7 +138,15 @@ def follow_lane(row: np.ndarray, line: np.ndarray, dt: float, shift: float) -> N
 
 @jit
 def move_along(row: np.ndarray, plan: TrafficParameters, line: np.ndarray, t: float, dt: float) -> None:
-    """Move a vehicle by dt, along its lane or over to the one that its plan names; arguments as above."""
+    """Move a vehicle by one step, along its lane or towards the lane that its plan names.
+
+    Args:
+        row: the vehicle's row of the traffic array, overwritten, shape (8,).
+        plan: plan of the vehicle.
+        line: reference line, shape (m, 6).
+        t: time at the start of the step [s].
+        dt: step [s].
+    """
     shift = 0.0
     if t + dt > plan.change_onset:
         done = change_progress(t, plan.change_onset, plan.change_duration)

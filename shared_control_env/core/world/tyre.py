@@ -1,8 +1,9 @@
-"""Lateral force of one tyre: the seam between the car and the road.
+"""Lateral force of one tyre: the interface between the car and the road.
 
-Eq. 11 has linear tyres, ``F = -C slip``, whose implicit step is closed (:mod:`core.world.vehicle`). Other tyres are
-functions of the slip angle, linearised in every step about the present slip. :func:`add_tyre` adds one from outside the
-package; it drives the car, and the controllers go on to believe in linear ones.
+Eq. 11 has linear tyres, ``F = -C slip``, for which the implicit step has a closed form (:mod:`core.world.vehicle`).
+Other tyres are functions of the slip angle; every step linearises them about the present slip angle. :func:`add_tyre`
+adds a tyre from outside the package. Such a tyre acts on the simulated car only: the controllers still assume linear
+tyres.
 """
 
 from __future__ import annotations
@@ -15,23 +16,27 @@ from shared_control_env.core.compile.calls import Interface
 FORCE = Interface((float, float), float, float, float, float)
 """``force(slip, C, mu, F_z) -> force, slope``.
 
-``slip``: slip angle [rad]; ``C``: cornering stiffness at zero slip [N/rad]; ``mu``: friction [-]; ``F_z``: load of the
-tyre [N]. ``force``: lateral force [N], against the slip; ``slope``: its derivative by the slip [N/rad], -C at zero.
+``slip``: slip angle [rad]; ``C``: cornering stiffness at zero slip [N/rad]; ``mu``: friction coefficient [-]; ``F_z``:
+vertical load of the tyre [N]. ``force``: lateral force [N], opposed to the slip; ``slope``: derivative of the force
+with respect to the slip angle [N/rad], -C at zero slip.
 """
 
 TYRES: dict[str, Callable[..., Any] | None] = {"linear": None}
-"""Tyres by name; None for the linear ones, which need no function."""
+"""Tyre forces by name; None for the linear tyre, which needs no function."""
+
+STANDARD = tuple(TYRES)
+"""Names of the package's own; those that others add come after them."""
 
 
 def add_tyre(name: str, force: Callable[..., Any]) -> None:
-    """Add a tyre, which settings may select from then on.
+    """Add a tyre. Settings can then select it by its name.
 
     Args:
-        name: in ``config["vehicle"]["tyre"]``.
-        force: compiled as :data:`FORCE`.
+        name: name of the tyre in ``config["vehicle"]["tyre"]``.
+        force: function of the lateral force with the signature :data:`FORCE`; it is compiled here.
 
     Raises:
-        ValueError: if the name is taken, or numba cannot compile it.
+        ValueError: if the name is taken, or if numba cannot compile the function.
     """
     if name in TYRES:
         raise ValueError(f"tyre {name!r} is there already")
@@ -40,10 +45,10 @@ def add_tyre(name: str, force: Callable[..., Any]) -> None:
 
 
 def address_of(name: str) -> int:
-    """Where a tyre's compiled force is; 0 for the linear one.
+    """Address of a tyre's compiled force; 0 for the linear tyre.
 
     Args:
-        name: key of :data:`TYRES`.
+        name: name of the tyre in :data:`TYRES`.
     """
     force = TYRES[name]
     return 0 if force is None else FORCE.address(force)

@@ -1,9 +1,9 @@
-"""Three-degree-of-freedom dynamic bicycle (Eq. 11), from standstill to motorway speed.
+"""Three-degree-of-freedom dynamic bicycle model (Eq. 11), from standstill to motorway speed.
 
-State ``z = [s, y, psi, v_x, v_y, r]``: position along and to the left of a path of curvature kappa,
-heading relative to it, longitudinal and lateral velocity in the body frame, yaw rate. With
-``kappa = 0`` the path is a straight line and ``[s, y, psi]`` is Eq. 11's ``[x, y, psi]``: the plant
-runs in the Cartesian frame with kappa = 0, the predictive controllers in the road frame.
+State ``z = [s, y, psi, v_x, v_y, r]``: position along a path of curvature kappa and to the left of the path [m],
+heading relative to the path [rad], longitudinal and lateral velocity in the body frame [m/s], yaw rate [rad/s]. With
+``kappa = 0`` the path is a straight line and ``[s, y, psi]`` is Eq. 11's ``[x, y, psi]``. The plant runs in the
+Cartesian frame with kappa = 0, the predictive controllers run in the road frame.
 Axes follow ISO 8855: x forward, y to the left, positive steering and yaw rate turn left.
 """
 
@@ -19,16 +19,16 @@ from shared_control_env.core.parameters import VehicleParameters
 from shared_control_env.core.world.tyre import FORCE
 
 S, Y, PSI, V_X, V_Y, R = range(6)
-"""Places in the state vector."""
+"""Indices in the state vector."""
 
 PLANT_SUBSTEPS = 2
-"""Extrapolated substeps of one 0.05 s plant step; the error against an exact solution is in the tests."""
+"""Number of extrapolated substeps of one 0.05 s plant step; the tests check the error against an exact solution."""
 
 GRAVITY = 9.81
-"""[m/s^2]."""
+"""Gravitational acceleration [m/s^2]."""
 
 SLOWEST_SLIP = 0.5
-"""Speed under which the slip angles of tyres that are not linear are taken as at this speed [m/s]."""
+"""Smallest speed with which the slip angles of nonlinear tyres are computed [m/s]."""
 
 _force = FORCE.call
 
@@ -36,7 +36,7 @@ Direction: TypeAlias = tuple[float, float]
 """Cosine and sine of an angle."""
 
 Axles: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
-"""Stiffness K [N/rad] and offset F [N] of the front and of the rear axle, whose lateral force is ``F - K slip``."""
+"""Stiffness K [N/rad] and offset F [N] of the front and the rear axle; an axle's lateral force is ``F - K slip``."""
 
 
 @jit_allocating
@@ -59,7 +59,7 @@ def derivative(z: np.ndarray, a: float, delta: float, kappa: float, vehicle: Veh
         a: acceleration command [m/s^2].
         delta: front steering angle [rad].
         kappa: curvature of the path [1/m]; 0 for the Cartesian frame.
-        vehicle: parameters.
+        vehicle: parameters of the vehicle.
 
     Returns:
         Time derivative of the state, shape (6,).
@@ -89,13 +89,13 @@ def implicit_step(
     vehicle: VehicleParameters,
     z_next: np.ndarray,
 ) -> Direction:
-    """One step of length h, implicit in the lateral motion: the discrete model f^d of Eq. 12.
+    """One step of length h that is implicit in the lateral motion: the discrete model f^d of Eq. 12.
 
-    One explicit 0.05 s step is unstable below about 15 m/s (yaw damping grows as 1/v_x), and the slip
-    angles are singular at standstill. As in Ge et al. (arXiv 2011.09612) the lateral equations are
-    taken at the end of the step and multiplied by v_x, which removes both; unlike there, v_y and r
-    are solved together, since the coupled backward Euler step is stable wherever Eq. 11 is.
-    The speed stops at zero: braking never reverses the car.
+    One explicit step of 0.05 s is unstable below about 15 m/s, since the yaw damping grows as 1/v_x. Moreover, the slip
+    angles are singular at standstill. As in Ge et al. (arXiv 2011.09612), the lateral equations are evaluated at the
+    end of the step and multiplied by v_x, which removes both problems. Unlike there, v_y and r are solved for together,
+    since the coupled backward Euler step is stable wherever Eq. 11 is stable. The speed stops at zero: braking never
+    reverses the car.
 
     ::
 
@@ -106,9 +106,9 @@ def implicit_step(
         psi+  = psi + h (r+ - kappa s')        s+ = s + h s'
         y+    = y + h (v sin(psi+) + v_y+ cos(psi+))
 
-    with ``K = 2 C`` an axle and ``c = cos(delta)``; tyres that are not linear add the offset of :func:`axles_at`. First
-    order in h. Sines and cosines are handed on from step to
-    step, since they cost as much as all the rest.
+    with the stiffness ``K = 2 C`` of an axle and ``c = cos(delta)``. Nonlinear tyres add the offset of
+    :func:`axles_at`. The step is of first order in h. Sines and cosines are passed on from step to step, since they
+    cost as much as the rest of the step.
 
     Args:
         z: state, shape (6,).
@@ -118,8 +118,8 @@ def implicit_step(
         wheel: cosine and sine of delta.
         kappa: curvature of the path [1/m].
         h: step [s].
-        vehicle: parameters.
-        z_next: the new state is written here, shape (6,); may be ``z`` itself.
+        vehicle: parameters of the vehicle; its tyres count as linear.
+        z_next: new state, written, shape (6,); may be ``z`` itself.
 
     Returns:
         Cosine and sine of the new psi.
@@ -140,7 +140,7 @@ def _implicit_step(
     axles: Axles,
     z_next: np.ndarray,
 ) -> Direction:
-    """:func:`implicit_step` with the tyres linearised as the axles say."""
+    """:func:`implicit_step` with given stiffness and offset of the axles."""
     (v, v_y, r), _ = _step_velocities(z, a, delta, wheel, h, vehicle, axles)
     heading, _ = _step_pose(z, heading, v, v_y, r, kappa, h, z_next)
     z_next[V_X], z_next[V_Y], z_next[R] = v, v_y, r
@@ -149,24 +149,24 @@ def _implicit_step(
 
 @jit_inlined
 def linear_axles(vehicle: VehicleParameters) -> Axles:
-    """Axles with the linear tyres of Eq. 11: ``K = 2 C``, and no offset.
+    """Stiffness and offset of both axles with the linear tyres of Eq. 11: ``K = 2 C``, without an offset.
 
     Args:
-        vehicle: parameters.
+        vehicle: parameters of the vehicle.
     """
     return (2.0 * vehicle.C_f, 0.0), (2.0 * vehicle.C_r, 0.0)
 
 
 @jit
 def axles_at(z: np.ndarray, delta: float, vehicle: VehicleParameters) -> Axles:
-    """Stiffness K and offset F of the front and of the rear axle, whose lateral force is ``F - K slip``.
+    """Stiffness K and offset F of the front and the rear axle; an axle's lateral force is ``F - K slip``.
 
-    Tyres that are not linear are linearised about the slip angle of the state; the load of a tyre is the static one.
+    Nonlinear tyres are linearised about the slip angle of the state. Each tyre has its static load.
 
     Args:
         z: state, shape (6,).
         delta: front steering angle [rad].
-        vehicle: parameters.
+        vehicle: parameters of the vehicle.
     """
     if vehicle.tyre == 0:
         return linear_axles(vehicle)
@@ -183,7 +183,11 @@ def axles_at(z: np.ndarray, delta: float, vehicle: VehicleParameters) -> Axles:
 def _step_velocities(
     z: np.ndarray, a: float, delta: float, wheel: Direction, h: float, vehicle: VehicleParameters, axles: Axles
 ) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """New speed, lateral velocity and yaw rate of :func:`implicit_step`, which solve ``M [v_y+, r+] = b``; M^-1."""
+    """New speed, lateral velocity and yaw rate of :func:`implicit_step`, which solve ``M [v_y+, r+] = b``.
+
+    Returns:
+        ``(v, v_y+, r+)`` and the entries of M^-1, row by row.
+    """
     v_y, r = z[V_Y], z[R]
     v = max(0.0, z[V_X] + h * (a + r * v_y))
     l_f, l_r = vehicle.l_f, vehicle.l_r
@@ -207,7 +211,11 @@ def _step_velocities(
 def _step_pose(
     z: np.ndarray, heading: Direction, v: float, v_y: float, r: float, kappa: float, h: float, z_next: np.ndarray
 ) -> tuple[Direction, float]:
-    """New pose of :func:`implicit_step` under the new velocities; cosine and sine of the new psi, and s'."""
+    """Write the new pose of :func:`implicit_step` under the new velocities.
+
+    Returns:
+        Cosine and sine of the new psi, and s'.
+    """
     s, y, psi = z[S], z[Y], z[PSI]
     s_rate = (v * heading[0] - v_y * heading[1]) / (1.0 - kappa * y)
     psi += h * (r - kappa * s_rate)
@@ -234,13 +242,13 @@ def implicit_step_jacobian(
 ) -> Direction:
     """:func:`implicit_step` with its derivatives ``A = dz+/dz`` and ``B = dz+/d[a, delta]``.
 
-    The lateral pair solves ``M x = b``; its derivative solves ``M dx = db - dM x``. Where braking holds
-    the speed at zero its derivatives vanish. The tyres are linear, as those of the controllers' model are.
+    The pair ``x = [v_y+, r+]`` solves ``M x = b``, so its derivative solves ``M dx = db - dM x``. Where braking holds
+    the speed at zero, the derivatives of the speed vanish. The tyres are linear, as in the controllers' model.
 
     Args:
         z, heading, a, delta, wheel, kappa, h, vehicle, z_next: as in :func:`implicit_step`.
-        A: written, shape (6, 6).
-        B: written, shape (6, 2).
+        A: derivative of the new state with respect to the state, written, shape (6, 6).
+        B: derivative of the new state with respect to the command, written, shape (6, 2).
 
     Returns:
         Cosine and sine of the new psi.
@@ -249,7 +257,7 @@ def implicit_step_jacobian(
     (v, v_y1, r1), (i11, i12, i21, i22) = _step_velocities(z, a, delta, wheel, h, vehicle, linear_axles(vehicle))
     heading1, s_rate = _step_pose(z, heading, v, v_y1, r1, kappa, h, z_next)
     z_next[V_X], z_next[V_Y], z_next[R] = v, v_y1, r1
-    # At rest the derivative is that of starting off, or a controller would never start.
+    # At rest the derivative is that for a car that starts to move; otherwise a controller would never start the car.
     moving = 1.0 if v_x + h * (a + r * v_y) >= 0.0 else 0.0
     K_f, c, sn, h_m, h_I = 2.0 * vehicle.C_f, wheel[0], wheel[1], h / vehicle.m, h / vehicle.I_z
 
@@ -302,16 +310,17 @@ def implicit_step_jacobian(
 def extrapolated_step(
     z: np.ndarray, a: float, delta: float, h: float, vehicle: VehicleParameters, work: np.ndarray
 ) -> None:
-    """Advance ``z`` in place by h in the Cartesian frame, second order in h.
+    """Advance the state in place by h in the Cartesian frame, with second order in h.
 
-    Richardson extrapolation of the implicit step, ``z(h) = 2 f(h/2, f(h/2, z)) - f(h, z)``, which keeps
-    its damping of the stiff lateral motion at any step (Hairer & Wanner, Solving ODEs II, Section IV.9).
+    This is the Richardson extrapolation of the implicit step, ``z(h) = 2 f(h/2, f(h/2, z)) - f(h, z)``. It keeps the
+    implicit step's damping of the stiff lateral motion at any step size (Hairer & Wanner, Solving ODEs II, Section
+    IV.9).
 
     Args:
-        z: state [x, y, psi, v_x, v_y, r], shape (6,), overwritten.
+        z: state ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
         a, delta: command [m/s^2, rad].
         h: step [s].
-        vehicle: parameters.
+        vehicle: parameters of the vehicle.
         work: scratch, shape (2, 6).
     """
     coarse, fine = work[0], work[1]
@@ -328,13 +337,13 @@ def extrapolated_step(
 
 @jit
 def plant_step(z: np.ndarray, a: float, delta: float, dt: float, vehicle: VehicleParameters, work: np.ndarray) -> None:
-    """Advance the plant by dt in place: :data:`PLANT_SUBSTEPS` extrapolated steps under a held command.
+    """Advance the plant in place by dt: :data:`PLANT_SUBSTEPS` extrapolated steps with a constant command.
 
     Args:
-        z: state [x, y, psi, v_x, v_y, r], shape (6,), overwritten.
+        z: state ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
         a, delta: command [m/s^2, rad], held over the step.
         dt: step [s].
-        vehicle: parameters.
+        vehicle: parameters of the vehicle.
         work: scratch, shape (2, 6).
     """
     for _ in range(PLANT_SUBSTEPS):

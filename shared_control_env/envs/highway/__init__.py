@@ -1,1 +1,1 @@
-"""What is derived from highway-env: road, vehicles, pictures, and what else its environments offer."""
+"""Classes derived from highway-env: road, vehicles, viewer and environment base class."""

@@ -1,4 +1,4 @@
-"""What highway-env's environments offer beside reset, step and render, and what of it makes sense here."""
+"""Methods of highway-env's environments beside reset, step and render: those that apply here, and those refused."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from shared_control_env.envs.highway.vehicles import EgoVehicle, LaneFollower
 
 
 class HighwayEnv(AbstractEnv):
-    """highway-env's base, whose methods either act or say why they cannot.
+    """highway-env's base class. Each inherited method either works or raises an error that states the reason.
 
-    ``simplify``, ``set_vehicle_field`` and ``call_vehicle_method`` return changed copies, for planning, as there.
+    ``simplify``, ``set_vehicle_field`` and ``call_vehicle_method`` return changed copies for planning, as in
+    highway-env.
     """
 
     @property
     def vehicle(self) -> Any:
-        """The ego."""
+        """The ego vehicle; None before the first reset."""
         return self.controlled_vehicles[0] if self.controlled_vehicles else None
 
     @vehicle.setter
@@ -29,10 +30,13 @@ class HighwayEnv(AbstractEnv):
         self.controlled_vehicles = [vehicle]
 
     def set_record_video_wrapper(self, wrapper: Any) -> None:
-        """Have a ``RecordVideo`` record every simulation step instead of every decision.
+        """Let a ``RecordVideo`` record every simulation step instead of every decision.
 
         Args:
             wrapper: gymnasium's ``RecordVideo`` around this environment; its frame rate is set.
+
+        Raises:
+            ValueError: if the wrapper is not a ``RecordVideo``.
         """
         if not hasattr(wrapper, "frames_per_sec") or not hasattr(wrapper, "_capture_frame"):
             raise ValueError(f"wrapper = {wrapper!r} must be a gymnasium.wrappers.RecordVideo")
@@ -40,38 +44,70 @@ class HighwayEnv(AbstractEnv):
         self.update_metadata()
 
     def get_available_actions(self) -> list[int]:
-        """Refused: there are no discrete actions to list."""
+        """Always raises ValueError, because there are no discrete actions to list."""
         raise ValueError(
             "get_available_actions(): the action is continuous, see action_space; there is no list of actions"
         )
 
     def to_finite_mdp(self) -> Any:
-        """Refused: there is no finite form of a continuous task."""
+        """Always raises ValueError, because the task is continuous and has no finite form."""
         raise ValueError("to_finite_mdp(): state and action are continuous; there is no finite Markov decision process")
 
     def change_vehicles(self, vehicle_class_path: str) -> AbstractEnv:
-        """Refused: the class of the other vehicles is a setting."""
+        """Always raises ValueError, because the class of the other vehicles is a setting.
+
+        Args:
+            vehicle_class_path: path of a vehicle class.
+
+        Raises:
+            ValueError: always.
+        """
         raise ValueError(
             f"change_vehicles({vehicle_class_path!r}): pass config={{'other_vehicles_type': ...}} to gym.make or reset"
         )
 
     def set_preferred_lane(self, preferred_lane: int | None = None) -> AbstractEnv:
-        """A copy in which highway-env's own vehicles prefer a lane; refused where there is none of them."""
+        """A copy of the environment in which vehicles of highway-env's IDMVehicle prefer a lane.
+
+        Args:
+            preferred_lane: index of the lane; None for no preference.
+
+        Raises:
+            ValueError: if there is no such vehicle.
+        """
         self._require_idm("set_preferred_lane")
         return super().set_preferred_lane(preferred_lane)
 
     def set_route_at_intersection(self, _to: str) -> AbstractEnv:
-        """A copy in which highway-env's own vehicles have a route; refused where there is none of them."""
+        """A copy of the environment in which vehicles of highway-env's IDMVehicle have a route.
+
+        Args:
+            _to: destination, as in highway-env.
+
+        Raises:
+            ValueError: if there is no such vehicle.
+        """
         self._require_idm("set_route_at_intersection")
         return super().set_route_at_intersection(_to)
 
     def randomize_behavior(self) -> AbstractEnv:
-        """A copy in which highway-env's own vehicles behave differently; refused where there is none of them."""
+        """A copy of the environment in which vehicles of highway-env's IDMVehicle behave randomly differently.
+
+        Raises:
+            ValueError: if there is no such vehicle.
+        """
         self._require_idm("randomize_behavior")
         return super().randomize_behavior()
 
     def set_vehicle_field(self, args: tuple[str, object]) -> AbstractEnv:
-        """A copy in which a field of the other vehicles is set; refused where they have no such field."""
+        """A copy of the environment in which a field of the other vehicles is set.
+
+        Args:
+            args: name of the field, and its value.
+
+        Raises:
+            ValueError: if the other vehicles have no such field, or the field would have no effect.
+        """
         self._require_attribute("set_vehicle_field", args[0])
         own = any(isinstance(vehicle, LaneFollower) for vehicle in self.road.vehicles)
         if own and args[0] not in ("position", "heading", "speed"):
@@ -81,14 +117,21 @@ class HighwayEnv(AbstractEnv):
         return super().set_vehicle_field(args)
 
     def call_vehicle_method(self, args: tuple[str, tuple[object]]) -> AbstractEnv:
-        """A copy in which the vehicles are what a method of theirs returns; refused where none has it."""
+        """A copy of the environment in which each other vehicle is replaced by the result of one of its methods.
+
+        Args:
+            args: name of the method, and its arguments.
+
+        Raises:
+            ValueError: if the other vehicles have no such method.
+        """
         self._require_attribute("call_vehicle_method", args[0])
         return super().call_vehicle_method(args)
 
     def _require_idm(self, method: str) -> None:
         if not any(isinstance(vehicle, IDMVehicle) for vehicle in self.road.vehicles):
             raise ValueError(
-                f"{method}() changes vehicles of highway-env's IDMVehicle, and there is none: set "
+                f"{method}() changes vehicles of highway-env's IDMVehicle, but there is none: set "
                 "config['other_vehicles_type'], or the vehicles' plans in config['vehicles']"
             )
 

@@ -1,4 +1,4 @@
-"""highway-env's road and its network for a reference line."""
+"""highway-env's road and road network along a reference line."""
 
 from __future__ import annotations
 
@@ -14,16 +14,22 @@ from shared_control_env.envs.highway.vehicles import write_row
 
 
 class LineRoad(Road):
-    """A road along a reference line, which checks collisions in the core.
+    """A road along a reference line. Its collisions are checked in the core.
 
-    highway-env's check runs in Python for every pair at every step. Here a collision is a present overlap, as
-    there; its displacement of vehicles that are about to collide is left out.
+    highway-env checks every pair of vehicles in Python at every step. As in highway-env, a collision is a present
+    overlap. Unlike highway-env, vehicles that are about to collide are not displaced.
+
+    Args:
+        line: reference line, shape (n, 6).
+        lanes: number of lanes.
+        lane_width: width of a lane [m].
+        options: further arguments of highway-env's ``Road``.
 
     Attributes:
         line: reference line, shape (n, 6).
         rows: all vehicles as rows of the traffic array, the ego first, shape (n_vehicles, 8).
-        lane_width: [m].
-        time: since the start of the episode [s].
+        lane_width: width of a lane [m].
+        time: time since the start of the episode [s].
     """
 
     def __init__(self, line: np.ndarray, lanes: int, lane_width: float, **options: Any) -> None:
@@ -33,7 +39,7 @@ class LineRoad(Road):
         self.rows = np.zeros((0, 8))
 
     def update_rows(self) -> np.ndarray:
-        """Write the vehicles' present state into ``rows``."""
+        """Write the present state of the vehicles into ``rows``, and return the array."""
         if len(self.rows) != len(self.vehicles):
             self.rows = np.zeros((len(self.vehicles), 8))
             self._crashed = np.zeros(len(self.vehicles), dtype=bool)
@@ -42,24 +48,28 @@ class LineRoad(Road):
         return self.rows
 
     def pass_frames(self, frames: int, dt: float) -> None:
-        """Let time go on.
+        """Advance the time of the road.
 
         Args:
-            frames: simulation steps.
-            dt: of one [s].
+            frames: number of simulation steps.
+            dt: simulation step [s].
         """
         self._frames += frames
-        self.time = self._frames * dt  # not a sum, which would drift
+        self.time = self._frames * dt  # a product, because a running sum would drift
 
     def step(self, dt: float) -> None:
-        """Move every vehicle by dt [s], then mark those that overlap as crashed."""
+        """Move every vehicle by one simulation step, then mark vehicles that overlap as crashed.
+
+        Args:
+            dt: simulation step [s].
+        """
         for vehicle in self.vehicles:
             vehicle.step(dt)
         self.pass_frames(1, dt)
         self.mark_collisions()
 
     def mark_collisions(self) -> None:
-        """Mark the vehicles that overlap as crashed."""
+        """Mark vehicles that overlap as crashed."""
         rows = self.update_rows()
         self._crashed[:] = False
         if find_collisions(rows, self._crashed):
@@ -68,17 +78,18 @@ class LineRoad(Road):
 
 
 def road_network(line: np.ndarray, lanes: int, lane_width: float) -> RoadNetwork:
-    """Network of parallel lanes along a reference line, which is the centre of lane 0.
+    """Network of parallel lanes along a reference line. The reference line is the centre of lane 0.
 
-    highway-env's ``lateral`` is the road frame's d minus the lane's centre: its formulas know no up or down.
+    highway-env's ``lateral`` equals d of the road frame minus the lateral position of the lane's centre, because
+    highway-env's formulas do not depend on whether y points up or down.
 
     Args:
         line: reference line, shape (n, 6).
         lanes: number of lanes, counted from the right.
-        lane_width: [m].
+        lane_width: width of a lane [m].
 
     Returns:
-        Nodes "0", "1", ... at the segments' ends.
+        Network with the nodes "0", "1", ... at the ends of the segments.
     """
     network = RoadNetwork()
     for i, row in enumerate(line):
@@ -94,14 +105,14 @@ def road_network(line: np.ndarray, lanes: int, lane_width: float) -> RoadNetwork
 
 
 def _lane(line: np.ndarray, row: np.ndarray, d: float, width: float, line_types: tuple[int, int]) -> AbstractLane:
-    """One lane of one segment, at offset d from the reference line."""
+    """One lane of one segment, at lateral offset d [m] from the reference line."""
     common = {"width": width, "line_types": line_types, "speed_limit": None}
     begin, kappa = np.array(point_at(line, row[S0], d)[:2]), row[KAPPA]
     psi0, length = row[PSI0], row[LENGTH]
     if kappa == 0.0:
         end = begin + length * np.array([np.cos(psi0), np.sin(psi0)])
         return StraightLane(begin, end, **common)
-    # "Clockwise" is as seen on a screen with y downwards: for growing angles, our left turns.
+    # "clockwise" refers to a screen with y downwards. It means growing angles, which are left turns in this frame.
     turn = 1.0 if kappa > 0.0 else -1.0
     radius = turn / kappa - turn * d
     centre = begin + turn * radius * np.array([-np.sin(psi0), np.cos(psi0)])

@@ -1,4 +1,4 @@
-"""Vehicles on highway-env's road: the ego with the core's dynamics, and traffic that follows its lane."""
+"""Vehicles on highway-env's road: the ego with the dynamics of the core, and traffic that follows its lane."""
 
 from __future__ import annotations
 
@@ -28,13 +28,22 @@ from shared_control_env.envs.settings import OWN_TRAFFIC
 
 
 class ArrayVehicle(Vehicle):
-    """A highway-env vehicle whose pose and speed live in one array that compiled functions advance.
+    """A highway-env vehicle whose pose and speed are stored in one array that compiled functions advance.
 
-    highway-env assigns and reads ``position``, ``heading`` and ``speed``; they are views of the array. The
-    lane is looked up when somebody asks, not at every step.
+    highway-env reads and assigns ``position``, ``heading`` and ``speed``; they are views of the array. The
+    lane is looked up when it is read, not at every step.
+
+    Args:
+        road: road of the vehicle.
+        position: position [x, y], shape (2,) [m].
+        heading: heading [rad].
+        speed: speed [m/s].
+
+    Attributes:
+        array: state of the vehicle; the subclass defines its entries.
     """
 
-    _POSE: tuple[int, int, int, int]  # places of x, y, heading and speed in the array
+    _POSE: tuple[int, int, int, int]  # indices of x, y, heading and speed in the array
     _SIZE: int
 
     def __init__(self, road: Road, position: Any, heading: float = 0.0, speed: float = 0.0) -> None:
@@ -83,11 +92,17 @@ class ArrayVehicle(Vehicle):
 
 
 class EgoVehicle(ArrayVehicle):
-    """The ego: ``array`` is the state [x, y, psi, v_x, v_y, r] of the dynamic bicycle (Eq. 11).
+    """The ego. ``array`` is the state [x, y, psi, v_x, v_y, r] of the dynamic bicycle model (Eq. 11).
+
+    Args:
+        road: road of the vehicle.
+        state: initial state [x, y, psi, v_x, v_y, r], shape (6,) [m, rad, m/s, rad/s].
+        target_speed: target speed [m/s].
+        parameters: record of :class:`core.parameters.Parameters`.
 
     Attributes:
-        target_speed: what highway-env's MOBIL expects of every vehicle [m/s].
-        parameters: record of :class:`Parameters`.
+        target_speed: target speed [m/s]; highway-env's MOBIL expects this attribute of every vehicle.
+        parameters: record of :class:`core.parameters.Parameters`.
     """
 
     _POSE = (0, 1, 2, 3)
@@ -104,21 +119,31 @@ class EgoVehicle(ArrayVehicle):
 
     @property
     def velocity(self) -> np.ndarray:
-        """Velocity of the centre of mass in the Cartesian frame, slip included [m/s]."""
+        """Velocity of the centre of mass in the Cartesian frame, slip included, shape (2,) [m/s]."""
         _, _, psi, v_x, v_y, _ = self.array
         return np.array([v_x * np.cos(psi) - v_y * np.sin(psi), v_x * np.sin(psi) + v_y * np.cos(psi)])
 
     def step(self, dt: float) -> None:
-        """Advance the dynamics by dt [s] under the stored action."""
+        """Advance the dynamics by one simulation step under the stored action.
+
+        Args:
+            dt: simulation step [s].
+        """
         action = self.action
         entries.drive(self.array, action["acceleration"], action["steering"], dt, self.parameters, self._work)
 
 
 class LaneFollower(ArrayVehicle):
-    """Traffic that follows its lane and its plan (:mod:`core.world.traffic`); ``array`` is its row of the traffic.
+    """A vehicle that follows its lane and its plan (:mod:`core.world.traffic`). ``array`` is its row of the traffic.
+
+    Args:
+        road: road of the vehicle.
+        position: position [x, y], shape (2,) [m].
+        heading: heading [rad].
+        speed: speed [m/s].
 
     Attributes:
-        plan: record of :class:`TrafficParameters`; by default constant speed, as in the paper's cases.
+        plan: record of :class:`core.parameters.TrafficParameters`; constant speed by default, as in the paper's cases.
     """
 
     _POSE = (X, Y, HEADING, SPEED)
@@ -131,25 +156,36 @@ class LaneFollower(ArrayVehicle):
         self.step(0.0)
 
     def act(self, action: dict | str | None = None) -> None:
-        """Decide on the acceleration."""
+        """Decide on the acceleration according to the plan.
+
+        Args:
+            action: ignored; an argument of highway-env's interface.
+        """
         road = self.road
         entries.decide_acceleration(
             self.array, self.plan, road.time, road.rows[0], road.rows[1:], road.line, road.lane_width
         )
 
     def step(self, dt: float) -> None:
-        """Advance along the lane by dt [s]."""
+        """Advance along the lane by one simulation step.
+
+        Args:
+            dt: simulation step [s].
+        """
         entries.move_along(self.array, self.plan, self.road.line, self.road.time, dt)
 
 
 def vehicle_class(path: str) -> type[Vehicle]:
-    """Class of the other vehicles by its path, such as ``highway_env.vehicle.behavior.IDMVehicle``.
+    """Find the class of the other vehicles by its path, such as ``highway_env.vehicle.behavior.IDMVehicle``.
 
-    A setting may come from a file of somebody else's, so that it imports nothing: a class is found in highway-env, in
-    this package, or in a module that the program has imported itself.
+    Settings may come from an untrusted file, so a path must not import arbitrary modules. The class must be in
+    highway-env, in this package, or in a module that the program has already imported.
+
+    Args:
+        path: path of the class, ``module.name``.
 
     Raises:
-        ValueError: if there is no such class, or it is no vehicle of highway-env.
+        ValueError: if there is no such class, or the class is not a vehicle class of highway-env.
     """
     module, _, name = path.rpartition(".")
     what = f"config['other_vehicles_type'] = {path!r}"
@@ -172,9 +208,13 @@ def vehicle_class(path: str) -> type[Vehicle]:
 
 
 def write_row(vehicle: Vehicle, row: np.ndarray) -> None:
-    """Write any highway-env vehicle as a row of the traffic array, shape (8,).
+    """Write a highway-env vehicle of any class into a row of the traffic array.
 
-    Acceleration and yaw rate of a kinematic vehicle are those of its present action.
+    For a kinematic vehicle, acceleration and yaw rate follow from its present action.
+
+    Args:
+        vehicle: the vehicle.
+        row: row to write, columns as in :mod:`core.records`, shape (8,).
     """
     if isinstance(vehicle, LaneFollower):
         row[:] = vehicle.array

@@ -1,4 +1,4 @@
-"""Rendering: highway-env's world with safe area, prediction and path, over a panel of gauges."""
+"""Rendering: highway-env's world with safe area, prediction and path, above a panel of gauges."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shared_control_env.core.world.road import point_at
 from shared_control_env.envs.settings.schema import PANEL_HEIGHT
 
 _SHAPE = ("screen_width", "screen_height", "centering_position", "scaling", "offscreen_rendering")
-"""Settings that a viewer is made for."""
+"""Settings that determine a viewer; a change requires a new viewer."""
 
 BACKGROUND, INK, FAINT = (250, 250, 250), (30, 30, 30), (205, 205, 205)
 AUTOMATION, DEGRADED, LIMITED, DRIVER = (0, 110, 200), (215, 45, 45), (150, 90, 200), (20, 140, 60)
@@ -29,7 +29,7 @@ _WINDOWS: WeakSet[SharedControlViewer] = WeakSet()
 
 
 class Drawn(Protocol):
-    """What a picture needs of an environment; see :class:`envs.shared_control.SharedControlEnv`."""
+    """Attributes of an environment that a picture needs; see :class:`envs.shared_control.SharedControlEnv`."""
 
     config: dict[str, Any]
     episode: Any
@@ -46,12 +46,20 @@ class Drawn(Protocol):
 class SharedControlViewer(EnvViewer):
     """Viewer of one environment.
 
-    highway-env draws y downwards; here y points left of the driving direction, so the world's picture is
-    flipped once drawn. Text is drawn after that.
+    highway-env draws y downwards. Here y points to the left of the driving direction, so the picture of the world is
+    flipped after drawing. Text is drawn after the flip.
+
+    Args:
+        env: the environment, see :class:`Drawn`.
+
+    Attributes:
+        env: the environment.
+        config: the settings that determine this viewer.
+        offscreen: whether no window is opened.
     """
 
     def __init__(self, env: Any) -> None:
-        # The parent's constructor opens a display even where it only draws on surfaces, so it is not called.
+        # The parent's constructor opens a display even for offscreen rendering, so it is not called.
         drawn: Drawn = env
         self.env, self.config = drawn, {name: env.config[name] for name in _SHAPE}
         self.offscreen = self.config["offscreen_rendering"]
@@ -82,17 +90,21 @@ class SharedControlViewer(EnvViewer):
             pygame.display.flip()
 
     def get_image(self) -> np.ndarray:
-        """The frame as an array of shape (height, width, 3), bytes."""
+        """The frame as an array of bytes, shape (height, width, 3)."""
         return np.ascontiguousarray(np.moveaxis(pygame.surfarray.array3d(self.frame_surface), 0, 1))
 
     def close(self) -> None:
-        """Close the window, which pygame has one of: it stays as long as another environment draws on it."""
+        """Close the window. pygame has a single window, which stays open while another environment draws on it."""
         _WINDOWS.discard(self)
         if not self.offscreen and not _WINDOWS:
             pygame.display.quit()
 
     def shows(self, config: dict[str, Any]) -> bool:
-        """Whether this viewer is one for a configuration."""
+        """Whether this viewer fits a configuration.
+
+        Args:
+            config: settings of the environment.
+        """
         return all(config[name] == value for name, value in self.config.items())
 
     def _draw_world(self) -> None:
@@ -110,7 +122,7 @@ class SharedControlViewer(EnvViewer):
         self.frame_surface.blit(pygame.transform.flip(surface, False, True), (0, 0))
 
     def _draw_safe_area(self) -> None:
-        """Fill C between its boundaries, in the road frame's curves."""
+        """Fill the safe area C between its boundaries, which bend with the road."""
         area, surface = self.env.scene["area"], self.sim_surface
         outline = np.vstack([_curved(area["lower"]), _curved(area["upper"])[::-1]])
         if len(outline) < 3:
@@ -122,16 +134,17 @@ class SharedControlViewer(EnvViewer):
         surface.blit(layer, (0, 0))
 
     def _draw_prediction(self) -> None:
-        """The CTRA prediction as a green diamond."""
+        """Draw the CTRA prediction as a green diamond."""
         x, y = self.sim_surface.vec2pix(self.env.signals["prediction"][:2])
         diamond = [(x - 9, y), (x, y - 9), (x + 9, y), (x, y + 9)]
         pygame.draw.polygon(self.sim_surface, PREDICTION, diamond)
         pygame.draw.polygon(self.sim_surface, INK, diamond, 1)
 
     def _draw_panel(self) -> None:
-        """Gauges of risk and authority on the left, of the commands on the right.
+        """Draw gauges of risk and authority on the left, and of the commands on the right.
 
-        They and the fault are of the step that led to the picture; time, speed and position are the picture's.
+        Gauges and fault show the step that led to the present scene. Time, speed and position are those of the
+        present scene.
         """
         env, noted = self.env, self.env.noted
         width, top = self.frame_surface.get_width(), self.frame_surface.get_height() - PANEL_HEIGHT
@@ -154,7 +167,7 @@ class SharedControlViewer(EnvViewer):
         for channel, (title, text, bound) in enumerate(
             (
                 ("acceleration", _acceleration, float(limits["a_max"])),
-                # A bar to the left is steering to the left, which is positive.
+                # Steering to the left is positive; the negative bound makes its bar point to the left.
                 ("steering", _steering, -float(limits["delta_max"])),
             )
         ):
@@ -186,7 +199,7 @@ class SharedControlViewer(EnvViewer):
         colour: tuple[int, int, int],
         centred: bool,
     ) -> None:
-        """A labelled bar of a value in [0, 1], or in [-1, 1] about its middle."""
+        """Draw a labelled bar for a value in [0, 1], or for a value in [-1, 1] about the middle."""
         x, y = corner
         self._write(label if centred else f"{label} = {value:.2f}", (x, y))
         pygame.draw.rect(self.frame_surface, FAINT, (x, y + 17, width, 9))
@@ -214,7 +227,7 @@ def _steering(value: float) -> str:
 
 
 def _curved(chain: np.ndarray, spacing: float = 2.0) -> np.ndarray:
-    """A boundary without its repeats, with points every ``spacing`` metres so that it bends with the road."""
+    """A boundary without repeated points, resampled every ``spacing`` [m] so that it bends with the road."""
     steps = np.hypot(*np.diff(chain, axis=0).T)
     chain = chain[: np.count_nonzero(steps) + 1]
     pieces = [

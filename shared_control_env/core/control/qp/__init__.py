@@ -1,1 +1,1 @@
-"""Solvers of the controllers' quadratic programs."""
+"""Solvers for the quadratic programs of the controllers."""

@@ -1,4 +1,4 @@
-"""Strictly convex quadratic programs with bounds, by a primal active-set method."""
+"""Solver for strictly convex quadratic programs with bounds, by a primal active-set method."""
 
 from __future__ import annotations
 
@@ -19,9 +19,12 @@ def _solve_free(
     factor: np.ndarray,
     solution: np.ndarray,
 ) -> int:
-    """Minimise over the free variables, the others held, by Cholesky into ``solution``; return how many they are.
+    """Minimise over the free variables, with the others held, by a Cholesky factorisation.
 
-    The diagonal of ``factor`` holds the reciprocals of the factor's, so that what is divided once is not divided again.
+    The diagonal of ``factor`` holds the reciprocals of the Cholesky factor's diagonal, which avoids repeated divisions.
+
+    Returns:
+        Number of free variables; their values are written to ``solution``.
     """
     m = 0
     for i in range(n):
@@ -64,16 +67,16 @@ def solve_box_qp(
 ) -> None:
     """Minimise ``x^T H x / 2 + g^T x`` subject to ``low <= x <= high``.
 
-    Starts at 0, which the bounds must contain, moves to the minimum over the free variables or to
-    the first bound on the way, and frees the bound whose multiplier is most wrong, until none is
-    (Nocedal & Wright, Numerical Optimization, Algorithm 16.3, for bounds alone).
+    The method starts at 0, which must lie within the bounds. It moves to the minimum over the free variables, or to the
+    first bound on the way. At a minimum it frees the variable whose multiplier violates its sign condition most. It
+    ends when no multiplier does (Nocedal & Wright, Numerical Optimization, Algorithm 16.3, for bounds alone).
 
     Args:
-        n: number of variables; arrays may be longer.
-        H: positive definite, shape (n, n).
-        g: shape (n,).
+        n: number of variables; the arrays may be longer.
+        H: positive definite matrix, shape (n, n).
+        g: linear term, shape (n,).
         low, high: bounds with ``low <= 0 <= high``, shape (n,).
-        x: the minimiser is written here, shape (n,).
+        x: minimiser, written, shape (n,).
         factor, solution: scratch, shapes (n, n) and (n,).
         bound: scratch, integer, shape (n,).
     """

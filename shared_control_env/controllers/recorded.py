@@ -1,4 +1,4 @@
-"""Drivers from recordings, and recordings of drivers."""
+"""Drivers that replay recordings, and recordings of drivers."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ COLUMNS = "t,a,delta"
 
 
 class RecordedDriver:
-    """Gives the commands of a recording at the time of the episode, linear between its samples, held beyond its ends.
+    """Replays recorded commands by the time of the episode, interpolated linearly and held beyond both ends.
 
-    It follows the clock and not the road: it fits the episode it was recorded in, or a task such as a given manoeuvre.
+    The driver follows the clock and not the road. A recording therefore fits the episode in which it was made, or a
+    task such as a given manoeuvre.
 
     Args:
-        samples: rows ``t, a, delta``, at least one, t rising, shape (T, 3) [s, m/s^2, rad].
+        samples: rows ``t, a, delta`` [s, m/s^2, rad], at least one, with increasing t, shape (T, 3).
 
     Raises:
-        ValueError: for samples of another shape, that are not finite, or whose time does not rise.
+        ValueError: if the samples have another shape or are not finite, or if their time does not increase.
     """
 
     def __init__(self, samples: np.ndarray) -> None:
@@ -36,10 +37,13 @@ class RecordedDriver:
 
     @staticmethod
     def read(path: Path | str) -> np.ndarray:
-        """The samples in a CSV file with the header :data:`COLUMNS`.
+        """Read the samples in a CSV file with the header :data:`COLUMNS`.
+
+        Args:
+            path: the file.
 
         Raises:
-            ValueError: if the header is another, or it holds something else than numbers.
+            ValueError: if the header differs, or if the file holds anything other than numbers.
         """
         with Path(path).open() as file:
             header = file.readline().strip()
@@ -48,19 +52,31 @@ class RecordedDriver:
         return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
 
     def reset(self, seed: int | None = None) -> None:
-        """Nothing is remembered."""
+        """Do nothing; the driver has no state.
+
+        Args:
+            seed: not used.
+        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Recorded command at the scene's time, shape (2,)."""
+        """Recorded command at the scene's time [m/s^2, rad], shape (2,).
+
+        Args:
+            observation: the environment's observation; not used.
+            scene: record of :data:`core.records.SCENE`; the time ``t`` is used.
+        """
         t = float(scene["t"])
         return np.array([np.interp(t, self._samples[:, 0], self._samples[:, i]) for i in (1, 2)])
 
 
 class RecordingDriver:
-    """Keeps what a driver commands, the last episode's.
+    """Records the commands of a driver; the recording holds the last episode.
 
     Args:
-        driver: who drives.
+        driver: the driver to record.
+
+    Attributes:
+        driver: the driver to record.
     """
 
     def __init__(self, driver: Driver) -> None:
@@ -68,21 +84,33 @@ class RecordingDriver:
         self._rows: list[tuple[float, float, float]] = []
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin a new recording."""
+        """Begin a new recording.
+
+        Args:
+            seed: seed for the driver.
+        """
         self._rows.clear()
         self.driver.reset(seed)
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """The driver's command, kept."""
+        """Record and return the driver's command.
+
+        Args:
+            observation: the environment's observation, shape (n,).
+            scene: record of :data:`core.records.SCENE`.
+        """
         a, delta = command = self.driver.act(observation, scene)
         self._rows.append((float(scene["t"]), float(a), float(delta)))
         return command
 
     def save(self, path: Path | str) -> None:
-        """Write a CSV file that :meth:`RecordedDriver.read` reads, to the bit.
+        """Write a CSV file that :meth:`RecordedDriver.read` reads back bit for bit.
+
+        Args:
+            path: the file.
 
         Raises:
-            FileExistsError: if there is such a file already.
+            FileExistsError: if the file already exists.
         """
         with Path(path).open("x") as file:
             np.savetxt(

@@ -10,9 +10,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from agents.card import check_card
-from agents.history import HISTORY, History
-from agents.views import (
+from shared_control_env.controllers.arrays import as_array
+from shared_control_env.core.parameters import Limits
+from shared_control_env.learned.card import check_card
+from shared_control_env.learned.history import HISTORY, History
+from shared_control_env.learned.views import (
     ALLOCATOR_FEATURES,
     DRIVER_FEATURES,
     FEATURES_OF,
@@ -21,30 +23,32 @@ from agents.views import (
     command,
     driver_view,
 )
-from shared_control_env.core.parameters import Limits
 
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "tanh": np.tanh,
     "relu": lambda x: np.maximum(x, 0.0),
 }
-"""Nonlinearities of the hidden layers."""
+"""Activation functions of the hidden layers."""
 
 
 ACTIONS = {"driver": 2, "allocator": 1}
-"""Numbers in the action of each task."""
+"""Number of entries in the action of each task."""
 
 Layer: TypeAlias = tuple[np.ndarray, np.ndarray]
-"""Weights (out, in) and biases (out,)."""
+"""Weights, shape (out, in), and biases, shape (out,)."""
 
 
 class Policy:
     """A multilayer perceptron from a history of observations to an action in [-1, 1].
 
     Args:
-        layers: all of them, the input's first.
-        hidden: name in :data:`ACTIVATIONS`.
-        squashed: whether the output goes through a tanh into the bounds; else it is clipped to them.
-        card: what it was trained as, see :mod:`agents.card`.
+        layers: all layers, the input layer first.
+        hidden: activation function of the hidden layers, a name in :data:`ACTIVATIONS`.
+        squashed: whether a tanh maps the output to the bounds; otherwise the output is clipped to the bounds.
+        card: card of the training; see :mod:`agents.card`.
+
+    Attributes:
+        layers, hidden, squashed, card: as the arguments.
     """
 
     def __init__(
@@ -60,7 +64,7 @@ class Policy:
         """Action for a history of observations.
 
         Args:
-            stacked: shape (..., HISTORY * size).
+            stacked: history of observations, shape (..., HISTORY * size).
         """
         x = stacked
         for weights, biases in self.layers[:-1]:
@@ -70,7 +74,11 @@ class Policy:
         return np.tanh(action) if self.squashed else np.clip(action, -1.0, 1.0)
 
     def save(self, path: Path) -> None:
-        """Write the policy as an ``.npz`` file with its card in it."""
+        """Write the policy with its card to an ``.npz`` file.
+
+        Args:
+            path: the file.
+        """
         arrays: Any = {
             f"{kind}{i}": a for i, layer in enumerate(self.layers) for kind, a in zip("Wb", layer, strict=True)
         }
@@ -81,8 +89,12 @@ class Policy:
     def load(cls, path: Path) -> Policy:
         """Read a policy.
 
+        Args:
+            path: the file.
+
         Raises:
-            ValueError: if it was trained for spaces or environments that there are no more, naming what differs.
+            ValueError: if the file is not a policy, or if the policy was trained for spaces or environments that do not
+                exist any more; the message names the difference.
         """
         try:
             with np.load(path, allow_pickle=False) as stored:
@@ -98,17 +110,17 @@ class Policy:
         return policy
 
     def _check(self, path: Path) -> None:
-        """Raise ValueError unless the layers make an action of the task of what it sees, in finite numbers."""
+        """Raise ValueError unless the layers are finite and map the task's observation to the task's action."""
         if not isinstance(self.hidden, str) or self.hidden not in ACTIVATIONS or not isinstance(self.squashed, bool):
             raise ValueError(
-                f"{path} has the shape hidden = {self.hidden!r}, squashed = {self.squashed!r}; known are "
-                f"{', '.join(ACTIVATIONS)}, and true or false"
+                f"{path} has the shape hidden = {self.hidden!r}, squashed = {self.squashed!r}; hidden must "
+                f"be one of {', '.join(ACTIVATIONS)}, and squashed true or false"
             )
         task = self.card["task"]
         sizes = [HISTORY * len(FEATURES_OF[task]), *(len(biases) for _, biases in self.layers)]
         if len(sizes) < 2 or sizes[-1] != ACTIONS[task]:
             raise ValueError(
-                f"{path} has {len(self.layers)} layer(s) and {sizes[-1]} outputs; it must have {ACTIONS[task]}"
+                f"{path} has {len(self.layers)} layer(s) and {sizes[-1]} outputs; it must have {ACTIONS[task]} outputs"
             )
         for i, (weights, biases) in enumerate(self.layers):
             if weights.shape != (sizes[i + 1], sizes[i]) or biases.shape != (sizes[i + 1],):
@@ -120,10 +132,24 @@ class Policy:
                 raise ValueError(f"{path}: layer {i} has weights or biases that are not finite numbers")
 
 
-def fold(layers: list[Layer], mean: np.ndarray, std: np.ndarray) -> list[Layer]:
-    """Layers that do what the given ones do to normalised input, to the input as it is.
+def as_array64(tensor: Any) -> np.ndarray:
+    """A tensor of PyTorch as an array of double precision.
 
+    Args:
+        tensor: on any device, with or without a gradient.
+    """
+    return np.asarray(as_array(tensor), dtype=np.float64)
+
+
+def fold(layers: list[Layer], mean: np.ndarray, std: np.ndarray) -> list[Layer]:
+    """Fold a normalisation of the input into the first layer.
+
+    The result acts on the raw input as the given layers act on the normalised input:
     ``W (x - mean) / std + b = (W / std) x + b - (W / std) mean``.
+
+    Args:
+        layers: layers for normalised input, the input layer first.
+        mean, std: mean and standard deviation of the input, shape (in,).
     """
     weights = layers[0][0] / std
     return [(weights, layers[0][1] - weights @ mean), *layers[1:]]
@@ -133,8 +159,8 @@ class LearnedDriver:
     """A trained policy as a :class:`~shared_control_env.controllers.driver.Driver`.
 
     Args:
-        policy: of the task ``driver``.
-        limits: of the commands.
+        policy: policy of the task ``driver``.
+        limits: limits of the commands; by default the environment's.
 
     Raises:
         ValueError: if the policy was trained for another task.
@@ -146,11 +172,20 @@ class LearnedDriver:
         self._limits = np.array(limits or Limits())
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin an episode; the policy draws nothing."""
+        """Begin an episode.
+
+        Args:
+            seed: not used, since the policy draws no random numbers.
+        """
         self._history.forget()
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
-        """Desired acceleration and steering, shape (2,)."""
+        """Desired acceleration and steering [m/s^2, rad], shape (2,).
+
+        Args:
+            observation: the environment's observation, shape (n,).
+            scene: record of :data:`core.records.SCENE`; the felt command is used.
+        """
         seen = self._history.push(driver_view(observation, scene["felt"])[None])
         return command(self._policy.act(seen))[0] * self._limits
 
@@ -159,7 +194,7 @@ class LearnedAllocator:
     """A trained policy as an :class:`~shared_control_env.controllers.allocators.Allocator`.
 
     Args:
-        policy: of the task ``allocator``.
+        policy: policy of the task ``allocator``.
 
     Raises:
         ValueError: if the policy was trained for another task.
@@ -170,11 +205,20 @@ class LearnedAllocator:
         self._policy, self._history = policy, History(1, len(ALLOCATOR_FEATURES))
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin an episode; the policy draws nothing."""
+        """Begin an episode.
+
+        Args:
+            seed: not used, since the policy draws no random numbers.
+        """
         self._history.forget()
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step."""
+        """alpha_a of one step.
+
+        Args:
+            scene: record of :data:`core.records.SCENE`.
+            signals: record of :data:`core.records.SIGNALS`.
+        """
         return float(authority(self._policy.act(self._history.push(allocator_view(scene, signals)[None])))[0, 0])
 
 

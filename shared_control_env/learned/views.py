@@ -1,11 +1,12 @@
-"""What policies see of a step, beside the environment's own observation; the fault is in none of it.
+"""What a policy sees in a step, in addition to the environment's own observation; the fault is never included.
 
-A driver has hands on the wheel and a foot on the pedal: it feels what the automation does there, which is the input of
-the paper's Eq. 16 too. Without it a driver who compensates well could not tell what it compensates: with K_h = 1 the
-car does in the long run what the driver wants, whatever the automation does. A driver sees how the vehicle ahead
-grows, too, which tells people when to brake and how hard (D. N. Lee, "A theory of visual control of braking based on
-information about time-to-collision", Perception 5, 1976, 437-459); the distance alone hardly changes in the last metres
-before standstill. An allocator has the car's sensors, and knows what the automation is about to do.
+A driver has hands on the wheel and a foot on the pedal, and feels the automation's action there. The same signal is
+the input of the paper's Eq. 16. Without it, a driver who compensates well could not tell what is compensated: with
+K_h = 1 the car follows the driver's command in the long run, whatever the automation does. A driver also sees how the
+image of the vehicle ahead grows. This tells people when to brake and how hard (D. N. Lee, "A theory of visual control
+of braking based on information about time-to-collision", Perception 5, 1976, 437-459). The distance alone hardly
+changes in the last metres before standstill. An allocator has the car's sensors, and knows the automation's next
+command.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ _DISTANCE = DRIVER_V0.place_of("preceding distance along the road [m]")
 _SPEED = DRIVER_V0.place_of("preceding speed minus the ego's [m/s]")
 
 _BODIES = 0.5 * (VehicleParameters().length + TRAFFIC_BODY[0])
-"""What the distance of the centres has to be less for the gap [m]."""
+"""Distance between the centres minus the gap [m]."""
 
 _FAR = FEATURES[_DISTANCE][1] - _BODIES
-"""Largest gap that the observation tells from others [m]."""
+"""Largest gap that the observation can represent [m]."""
 
 _NEAR = 0.1
-"""Gaps below count as this [m]."""
+"""Lower limit of the gap; smaller gaps count as this one [m]."""
 
 DRIVER_FEATURES: tuple[tuple[str, float], ...] = (
     *FEATURES,
@@ -42,10 +43,10 @@ DRIVER_FEATURES: tuple[tuple[str, float], ...] = (
     ("inverse time to collision with it [1/s]", 1.0),
     ("deceleration that avoids the collision [m/s^2]", _LIMITS.a_max),
 )
-"""Name and scale of every entry: the environment's observation, what is felt, and what is seen of the one ahead."""
+"""Name and scale of every entry: the environment's observation, the felt command, and the view of the vehicle ahead."""
 
 ALLOCATOR_FEATURES: tuple[tuple[str, float], ...] = (
-    *FEATURES[: DRIVER_V0.place_of("curvature 10 m ahead [1/m]")],  # the ego's motion, and the curvature where it is
+    *FEATURES[: DRIVER_V0.place_of("curvature 10 m ahead [1/m]")],  # the ego's motion, and the curvature at the ego
     ("automation's last actual acceleration [m/s^2]", _LIMITS.a_max),
     ("automation's last actual steering [rad]", _LIMITS.delta_max),
     ("automation's degraded acceleration u_a,f [m/s^2]", _LIMITS.a_max),
@@ -61,23 +62,23 @@ FEATURES_OF = {"driver": DRIVER_FEATURES, "allocator": ALLOCATOR_FEATURES}
 """What a policy of each task sees."""
 
 DEAD_ZONE = 0.06
-"""A driver's policy that asks for less than this share of the limits leaves wheel and pedal alone."""
+"""Share of the limits below which the action of a driver's policy leaves wheel and pedal alone [-]."""
 
 _OWN_SCALES = np.array([scale for _, scale in DRIVER_FEATURES[len(FEATURES) :]])
 _SCALES = np.array([scale for _, scale in ALLOCATOR_FEATURES])
 
 
 def driver_view(observations: np.ndarray, felt: np.ndarray) -> np.ndarray:
-    """:data:`DRIVER_FEATURES` over their scales.
+    """:data:`DRIVER_FEATURES` divided by their scales.
 
     ::
 
-        gap             = s_p - s - 5 m, bumper to bumper; 0.1 m at least, and the farthest one without a vehicle
+        gap             = s_p - s - 5 m, bumper to bumper; at least 0.1 m; the largest gap without a vehicle ahead
         1 / TTC         = -(v_p - v) / gap
-        a that avoids   = max(0, v - v_p)^2 / (2 gap), if the one ahead keeps its speed
+        a that avoids   = max(0, v - v_p)^2 / (2 gap), if the vehicle ahead keeps its speed
 
     Args:
-        observations: of the environment, of :data:`DRIVER_V0`, shape (..., n).
+        observations: observations of the environment, of :data:`DRIVER_V0`, shape (..., n).
         felt: u_a,act of the step before, a scene's ``felt`` [m/s^2, rad], shape (..., 2).
 
     Returns:
@@ -93,14 +94,14 @@ def driver_view(observations: np.ndarray, felt: np.ndarray) -> np.ndarray:
 
 
 def allocator_view(scenes: np.ndarray, signals: np.ndarray) -> np.ndarray:
-    """:data:`ALLOCATOR_FEATURES` over their scales; the fault is not in them.
+    """:data:`ALLOCATOR_FEATURES` divided by their scales; they do not include the fault.
 
     Args:
         scenes: records of :data:`core.records.SCENE`, any shape.
         signals: planned signals of the same step, records of :data:`core.records.SIGNALS`, same shape.
 
     Returns:
-        float32, that shape with 26 entries each.
+        float32, the same shape with 26 entries for each record.
     """
     z, near = scenes["z"], scenes["neighbours"]
     present = near[..., PRESENT]
@@ -131,25 +132,39 @@ def allocator_view(scenes: np.ndarray, signals: np.ndarray) -> np.ndarray:
 
 
 def view(task: str, observations: np.ndarray, scenes: np.ndarray, signals: np.ndarray) -> np.ndarray:
-    """What a policy of a task sees; arguments as in :func:`driver_view` and :func:`allocator_view`."""
+    """What a policy of a task sees.
+
+    Args:
+        task: key of :data:`agents.tasks.TASKS`.
+        observations: as in :func:`driver_view`.
+        scenes: as in :func:`allocator_view`.
+        signals: as in :func:`allocator_view`.
+    """
     if task == "driver":
         return driver_view(observations, scenes["felt"])
     return allocator_view(scenes, signals)
 
 
 def command(action: np.ndarray) -> np.ndarray:
-    """The driver's command over its limits of a policy's action in [-1, 1]: hands that ask for little rest.
+    """The driver's command, divided by its limits, for a policy's action; small actions give zero.
 
-    ``sign(a) max(0, |a| - d) / (1 - d)`` with the dead zone d: a network is never quite at zero, and would trouble a
-    sound automation all the time.
+    ``sign(a) max(0, |a| - d) / (1 - d)`` with the dead zone d. The output of a network is never exactly zero, and would
+    otherwise disturb a sound automation all the time.
+
+    Args:
+        action: action of the policy in [-1, 1], any shape.
     """
     return np.sign(action) * np.maximum(np.abs(action) - DEAD_ZONE, 0.0) / (1.0 - DEAD_ZONE)
 
 
 def authority(action: np.ndarray) -> np.ndarray:
-    """alpha_a in [0, 1] of an allocator's action in [-1, 1]: a policy that knows nothing yet begins in the middle."""
+    """alpha_a in [0, 1] for an allocator's action; an untrained policy therefore begins near the middle.
+
+    Args:
+        action: action of the policy in [-1, 1], any shape.
+    """
     return 0.5 * (action + 1.0)
 
 
 ACTION_OF = {"driver": command, "allocator": authority}
-"""What fills a task's slot of the environment's action, of a policy's action."""
+"""Map from a policy's action to the value of the task's slot in the environment's action."""

@@ -230,7 +230,7 @@ def advance_through(
     Args:
         i: index of the environment.
         steps: number of time steps.
-        anew: whether to begin the next episode once one has ended (autoreset); if False, stop at the end.
+        anew: whether to begin the next episode after one has ended (autoreset); if False, stop at the end.
         commands: the driver's commands divided by their limits [-], shape (N, 2), held over the steps.
         alphas: authorities of the automation [-], shape (N, 1), held over the steps.
         batch: state of all environments; entry i is written.

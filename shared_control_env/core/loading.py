@@ -1,4 +1,4 @@
-"""What a step runs, compiled or read from numba's cache, and where it is in memory."""
+"""Loading of the functions that a step runs: compiled or read from numba's cache, with their addresses in memory."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from shared_control_env.core.risk.finding import SEARCH, TRIANGULATE, search, tr
 def load(
     compile_kernel: Callable[[], None], driver: bool, allocate: Callable[..., float] | None, observation: Observation
 ) -> Calls:
-    """Compile what is not in numba's cache, on two cores where there are such, and say where it is.
+    """Compile the functions that are not in numba's cache, on two cores if possible, and return all addresses.
 
     Args:
-        compile_kernel: calls the kernel for no environment.
+        compile_kernel: function that compiles the kernel, by calling it without any active environment.
         driver: whether the predictive driver is bound.
-        allocate: the allocator that is bound, for :data:`ALLOCATE`; None for none.
-        observation: which one.
+        allocate: the bound allocator, with the signature :data:`ALLOCATE`; None if no allocator is bound.
+        observation: specification of the observation.
     """
     compiled: Any = kernel.advance
     if not is_interpreted() and not compiled.signatures and has_second_core() and not is_cached(compiled):
@@ -41,7 +41,7 @@ def load(
 
 
 def compile_others(driver: bool) -> None:
-    """Compile what the kernel calls by address, as the second process of a cold start.
+    """Compile the functions that the kernel calls by address; the second process of a cold start runs this.
 
     Args:
         driver: whether the predictive driver is bound.

@@ -250,7 +250,7 @@ class PersonMemory:
 
 
 class Transition:
-    """What the reward's terms need of a step beside the scene and the signals.
+    """What the terms of the reward need of a step, in addition to the scene and the signals.
 
     Attributes:
         previous_s: path length before the step [m].

@@ -1,1 +1,4 @@
-"""Numba's plumbing. Changing an equation needs none of it; docs/compiling.md says when one needs to know."""
+"""Compilation by numba: decorators, disk cache, calls by address and cold start.
+
+Changing an equation requires no knowledge of this package; docs/compiling.md says when it is needed.
+"""

@@ -1,4 +1,4 @@
-"""A count that threads share."""
+"""An atomic counter that several threads share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from shared_control_env.core.compile.jit import is_interpreted
 
 
 def _fetch_add(typing_context: Any, counts: Any, index: Any, amount: Any) -> Any:
-    """Add to an entry of a contiguous int64 array and return what it was, with no other thread in between."""
+    """Add to an entry of a contiguous int64 array and return its previous value, as one atomic operation."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         first = make_array(signature.args[0])(context, builder, values[0]).data
@@ -23,11 +23,11 @@ def _fetch_add(typing_context: Any, counts: Any, index: Any, amount: Any) -> Any
 
 
 def _add(counts: np.ndarray, index: int, amount: int) -> int:
-    """The same where the core runs as Python, in one thread."""
+    """Add to an entry and return its previous value; used where the core runs as Python, in one thread."""
     before = int(counts[index])
     counts[index] += amount
     return before
 
 
 fetch_add: Any = _add if is_interpreted() else intrinsic(_fetch_add)
-"""``fetch_add(counts, index, amount)``: add to an entry and return what it was, with no other thread in between."""
+"""``fetch_add(counts, index, amount)``: add to an entry and return its previous value, as one atomic operation."""

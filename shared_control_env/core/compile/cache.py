@@ -1,8 +1,9 @@
-"""Numba's disk cache, kept apart for every state of the sources, and never in the way.
+"""Numba's disk cache, with a separate folder for every state of the sources.
 
-Numba compares only a function's own file with its cache, yet the machine code holds what the function calls in other
-files too. So the digest of all compiled sources is part of the cache's path: a process that still runs older sources
-writes to another folder. A cache that is damaged or cannot be written costs time and one line on stderr, no more.
+Numba checks only whether a function's own file has changed. The machine code, however, also contains functions from
+other files. The digest of all compiled sources is therefore part of the path of the cache. A process that still runs
+older sources writes to another folder. A cache that is damaged or cannot be written only costs time and produces one
+line on stderr.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ from numba.core.caching import (
 _PACKAGE = Path(__file__).parent.parent.parent
 
 COMPILED = ("core", "controllers", "vector")
-"""Rooms of the package that hold compiled functions; all their sources count, however deep they lie."""
+"""Subpackages that contain compiled functions; the digest covers all their sources, nested folders included."""
 
 KEPT = 8
-"""States of the sources whose compiled forms are kept, the last used ones."""
+"""Number of states of the sources whose compiled functions are kept: the most recently used ones."""
 
 
 def _digest_of_sources() -> str:
@@ -42,12 +43,16 @@ def _digest_of_sources() -> str:
 
 
 FOLDER = f"shared_control_env-{_digest_of_sources()[:20]}"
-"""Name of the cache's folder: of the sources as they were when this process imported them."""
+"""Name of the cache folder; it belongs to the sources as they were when this process imported them."""
 
 
 @cache
 def say_once(text: str) -> None:
-    """Print a line on stderr, if there is one, the first time that it is asked for."""
+    """Print a line on stderr, only once per process, and only if the process has a stderr.
+
+    Args:
+        text: text of the line, without the name of the package.
+    """
     if sys.stderr is not None:
         print(f"shared_control_env: {text}", file=sys.stderr, flush=True)
 
@@ -61,18 +66,18 @@ def _say_uncached(reason: object) -> None:
 
 @cache
 def _tidy(path: Path) -> None:
-    """Mark a cache folder as used now; of those beside it remove all but the last used ones."""
+    """Mark a cache folder as used now, and remove all but the most recently used of the folders beside it."""
     try:
         os.utime(path)
         folders = sorted(path.parent.glob("shared_control_env-*"), key=lambda folder: folder.stat().st_mtime)
         for folder in folders[:-KEPT]:
             shutil.rmtree(folder, ignore_errors=True)
-    except OSError:  # of another user, or removed by another process
+    except OSError:  # the folder belongs to another user, or another process has removed it
         return
 
 
 def _apart(locator: Any) -> Any:
-    """One of numba's locators with the sources' folder below its own."""
+    """Derive from one of numba's locators a locator that uses the folder of the present sources below its own."""
 
     def get_cache_path(self: Any) -> str:
         return os.path.join(locator.get_cache_path(self), FOLDER)
@@ -85,7 +90,7 @@ class _Implementation(CompileResultCacheImpl):
 
 
 class _CheckedFile(IndexDataCacheFile):
-    """Files that begin with their digest: damaged machine code would be a wrong equation, or a crash."""
+    """Cache files that begin with their digest, since damaged machine code would give wrong results or a crash."""
 
     def _save_data(self, name: str, data: Any) -> None:
         content = self._dump(data)
@@ -99,7 +104,7 @@ class _CheckedFile(IndexDataCacheFile):
 
 
 class _Cache(FunctionCache):
-    """Cache of one function."""
+    """Disk cache of one function."""
 
     _impl_class = _Implementation
 
@@ -111,10 +116,15 @@ class _Cache(FunctionCache):
         _tidy(Path(self._cache_path))
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """The compiled function, or None where there is none that can be read."""
+        """Return the compiled function, or None if the cache has none that can be read.
+
+        Args:
+            signature: numba signature of the compiled function.
+            target_context: numba's target context.
+        """
         try:
             return super().load_overload(signature, target_context)
-        except Exception as error:  # whatever unpickling a damaged file raises
+        except Exception as error:  # unpickling a damaged file may raise any exception
             say_once(
                 f"the cache in {self._cache_path} is damaged ({type(error).__name__}); what is needed is compiled anew."
             )
@@ -125,7 +135,12 @@ class _Cache(FunctionCache):
             return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep a compiled function, if the disk takes it."""
+        """Store a compiled function, if the disk can be written to.
+
+        Args:
+            signature: numba signature of the compiled function.
+            data: numba's result of the compilation.
+        """
         try:
             super().save_overload(signature, data)
         except OSError as error:
@@ -133,7 +148,11 @@ class _Cache(FunctionCache):
 
 
 def cache_of(function: Callable[..., Any]) -> Any:
-    """A cache for what a function is compiled to; one that keeps nothing where no folder can be written to."""
+    """Disk cache for the compiled forms of a function; a cache that stores nothing if no folder can be written to.
+
+    Args:
+        function: Python function of this package.
+    """
     try:
         return _Cache(function)
     except (RuntimeError, OSError) as error:
@@ -142,5 +161,8 @@ def cache_of(function: Callable[..., Any]) -> Any:
 
 
 def no_cache() -> Any:
-    """For what is not of this package, whose changes nobody follows: it is compiled at every start."""
+    """Cache that stores nothing, for functions outside this package.
+
+    Changes of such functions are not tracked, so they are compiled at every start.
+    """
     return NullCache()

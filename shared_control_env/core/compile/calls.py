@@ -1,8 +1,9 @@
-"""Compiled functions that others call by their address.
+"""Compiled functions that other compiled functions call by their address.
 
-LLVM optimises all that a function calls anew together with it. Through an address the kernel stays small, what no
-setting uses is never compiled, two processes can compile at the same time (:mod:`cold_start`), and what somebody adds
-from outside the package (a tyre, a kind of degradation, a reward term) enters without compiling the rest again.
+LLVM optimises a function together with everything that the function calls. Calls by address have four advantages. The
+kernel stays small. Functions that no setting uses are never compiled. Two processes can compile at the same time
+(:mod:`cold_start`). Additions from outside the package (a tyre, a kind of degradation, a reward term) do not require
+the rest to be compiled again.
 """
 
 from __future__ import annotations
@@ -25,20 +26,21 @@ from shared_control_env.core.records import record_dtype
 PACKAGE = __name__.partition(".")[0]
 
 MATRIX = types.Array(types.float64, 2, "C")
-"""Type of an array of floats with two dimensions."""
+"""Numba's type of a two-dimensional array of double-precision floats."""
 
 SINGLES = types.Array(types.float32, 1, "C")
-"""Type of an array of single-precision floats with one dimension."""
+"""Numba's type of a one-dimensional array of single-precision floats."""
 
 _interpreted: list[Callable[..., Any]] = [lambda: None]
-"""Functions by their address minus one, where the core runs as Python; none has the address 0."""
+"""Functions by their address, where the core runs as Python; the first entry keeps address 0 from being used."""
 
 
 def compiled_type(kind: Any) -> Any:
-    """Numba's type for None, a number, a tuple of these, a structured type, a class of fields, or a type of its own.
+    """Numba's type that corresponds to a Python type.
 
     Args:
-        kind: a class of :mod:`core.records` or :mod:`core.parameters` stands for a record of its fields.
+        kind: None, ``float``, ``int``, ``bool``, a tuple of types, a structured NumPy type, one of numba's types, or a
+            class of :mod:`core.records` or :mod:`core.parameters`, which stands for a record with its fields.
     """
     if kind is None:
         return types.void
@@ -55,19 +57,23 @@ _NUMBERS = {float: types.float64, int: types.int64, bool: types.boolean}
 
 
 def by_value(kind: Any) -> Any:
-    """Numba's type for a named tuple that is passed as it is, and not as a record; its fields may be records."""
+    """Numba's type of a named tuple that is passed as a tuple and not as a record; its fields may be records.
+
+    Args:
+        kind: class of the named tuple.
+    """
     return types.NamedTuple([compiled_type(hint) for hint in get_type_hints(kind).values()], kind)
 
 
 class Interface:
-    """What a family of functions takes and gives, so that compiled code can call any of them by its address.
+    """Signature of a family of functions, any of which compiled code can call by its address.
 
     Args:
-        result: type of what they return, see :func:`compiled_type`.
-        arguments: types of their arguments.
+        result: type of the returned value, see :func:`compiled_type`.
+        arguments: types of the arguments, see :func:`compiled_type`.
 
     Attributes:
-        call: for compiled code, ``call(address, *arguments)``.
+        call: function for compiled code, ``call(address, *arguments)``.
     """
 
     def __init__(self, result: Any, *arguments: Any) -> None:
@@ -76,13 +82,13 @@ class Interface:
         self.call = _call_interpreted if is_interpreted() else _call_of(self._signature)
 
     def address(self, function: Callable[..., Any]) -> int:
-        """Where a function is in memory; it is compiled for that, or read from numba's cache.
+        """Address of a function in memory. The function is compiled first, or read from numba's cache.
 
         Args:
-            function: Python that numba compiles, or what it has compiled already.
+            function: Python function, or a function that numba has already compiled.
 
         Raises:
-            ValueError: if numba cannot compile it to take and give this.
+            ValueError: if numba cannot compile the function with this signature.
         """
         plain: Any = getattr(function, "py_func", function)
         if plain not in self._compiled:
@@ -94,7 +100,7 @@ class Interface:
         return len(_interpreted) - 1, function
 
     def _compile(self, function: Callable[..., Any]) -> tuple[int, Any]:
-        options: Any = {"error_model": "numpy", "_nrt": False}  # as core.compile.jit has them
+        options: Any = {"error_model": "numpy", "_nrt": False}  # the same as in core.compile.jit
         signature = self._signature
         compiled: Any = CFunc(function, (signature.args, signature.return_type), locals={}, options=options)
         own = function.__module__.partition(".")[0] == PACKAGE
@@ -104,7 +110,7 @@ class Interface:
         except NumbaError as error:
             name = f"{function.__module__}.{function.__qualname__}"
             raise ValueError(f"{name} cannot be compiled: {error}") from None
-        return compiled.address, compiled  # which is kept, lest its code is freed
+        return compiled.address, compiled  # the object is kept, since its code would be freed otherwise
 
 
 def _call_interpreted(address: int, *arguments: Any) -> Any:
@@ -112,7 +118,7 @@ def _call_interpreted(address: int, *arguments: Any) -> Any:
 
 
 def _call_of(signature: Any) -> Any:
-    """A call of a function with this signature at an address, in compiled code."""
+    """Intrinsic for compiled code that calls a function with this signature at an address."""
 
     @intrinsic
     def call(typing_context: Any, address: Any, *arguments: Any) -> Any:

@@ -1,7 +1,7 @@
-"""A cold start on two cores: another process compiles some functions while this one compiles the others.
+"""Cold start on two cores: another process compiles some functions while this process compiles the others.
 
-What it compiles ends in numba's cache, where this process finds it. Numba compiles one function at a time in a process,
-so that threads would not help.
+The other process stores its results in numba's cache, where this process finds them. Numba compiles only one function
+at a time in a process, so threads would not help.
 """
 
 from __future__ import annotations
@@ -14,33 +14,33 @@ from collections.abc import Callable
 from typing import Any
 
 PATIENCE = 120.0
-"""How long the other process is waited for [s]; after that this one compiles all by itself."""
+"""Longest time to wait for the other process [s]; after that, this process compiles everything itself."""
 
 
 def cores() -> list[int]:
-    """Cores that this process may use, where the system says."""
+    """Indices of the cores that this process may use, or of all cores if the system does not tell."""
     return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
 
 
 def has_second_core() -> bool:
-    """Whether another process may be started, and has a core.
+    """Whether another process may be started and has a core to run on.
 
-    Worker processes have other work for their cores; an application that is frozen cannot start Python anew.
+    Worker processes need their cores for other work. A frozen application cannot start a new Python interpreter.
     """
     worker = multiprocessing.parent_process() is not None
     return not worker and not getattr(sys, "frozen", False) and len(cores()) > 1
 
 
 def run_beside(code: str, here: Callable[[], None]) -> None:
-    """Run Python code in another process and a function in this one, and wait for both.
+    """Run Python code in another process and a function in this process at the same time, and wait for both.
 
     Args:
-        code: of the other process, which finds the same modules.
-        here: what this process does meanwhile; left out where no other process can be started.
+        code: Python code for the other process, which uses the same module search path.
+        here: function that this process calls meanwhile; not called if no other process can be started.
     """
     silent: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     try:
-        # As multiprocessing does: with the flags that this Python was started with, such as -I.
+        # As in multiprocessing, the other process gets the flags that this interpreter was started with, such as -I.
         flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
         code = f"import sys; sys.path[:] = {sys.path!r}; {code}"
         other = subprocess.Popen([sys.executable, *flags, "-c", code], **silent)

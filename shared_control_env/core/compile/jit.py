@@ -1,4 +1,4 @@
-"""The one numba decorator of the core: its disk cache, and the notice that a cold compilation gives."""
+"""The numba decorators of the core, with their disk cache and the notice printed on a cold compilation."""
 
 from __future__ import annotations
 
@@ -20,24 +20,34 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def jit(function: F) -> F:
-    """Compile with a disk cache.
+    """Decorator: compile a function, with a disk cache.
 
-    Divisions follow IEEE 754 as in NumPy. Neither fast-math nor threads are used within a function, so
-    that rollouts repeat to the bit.
+    Divisions follow IEEE 754, as in NumPy. Neither fast-math nor threads are used within a function, so that rollouts
+    are bitwise reproducible.
+
+    Args:
+        function: Python function that creates no arrays.
     """
     return _compile(function, inline="never")
 
 
 def jit_allocating(function: F) -> F:
-    """As :func:`jit`, for a function that makes arrays."""
+    """Decorator: as :func:`jit`, for a function that creates arrays.
+
+    Args:
+        function: Python function.
+    """
     return _compile(function, inline="never", allocating=True)
 
 
 def jit_inlined(function: F) -> F:
-    """As :func:`jit`, for a function that one or two others call: it is compiled as a part of them.
+    """Decorator: as :func:`jit`, for a function with one or two callers, which is compiled as a part of its callers.
 
-    LLVM optimises all that a function calls anew for each of its callers, so that every layer of a deep
-    composition would cost as much to compile as the whole.
+    LLVM optimises everything that a function calls once more for each caller. Without inlining, every layer of a deep
+    call tree would take as long to compile as the whole tree.
+
+    Args:
+        function: Python function that creates no arrays.
     """
     return _compile(function, inline="always")
 
@@ -48,9 +58,9 @@ def _compile(function: F, inline: str, allocating: bool = False) -> F:
         "nogil": True,
         "inline": inline,
         "no_cfunc_wrapper": True,
-        # Arrays are made nowhere in the step path, so that nobody needs to count who holds them.
+        # No arrays are created in a step, so no reference counting is needed.
         "_nrt": allocating,
-        # A private function is never called from Python, so it needs no entry for that.
+        # A private function is never called from Python, so it needs no wrapper for such calls.
         "no_cpython_wrapper": function.__name__.startswith("_"),
     }
     if is_interpreted():
@@ -62,13 +72,16 @@ def _compile(function: F, inline: str, allocating: bool = False) -> F:
 
 
 def is_interpreted() -> bool:
-    """Whether the core runs as Python, since the environment variable ``NUMBA_DISABLE_JIT`` is set."""
+    """Whether the core runs as Python because the environment variable ``NUMBA_DISABLE_JIT`` is set."""
     settings: Any = config
     return bool(settings.DISABLE_JIT)
 
 
 def _interpreted(function: F) -> F:
-    """The function as Python, for debuggers (``NUMBA_DISABLE_JIT=1``): fields of records are attributes there too."""
+    """Wrap a function that runs as Python, for debuggers (``NUMBA_DISABLE_JIT=1``).
+
+    The wrapper makes the fields of records accessible as attributes, as in compiled code.
+    """
     say_once("NUMBA_DISABLE_JIT is set: the core runs as Python, some thousand times slower.")
 
     @wraps(function)
@@ -84,7 +97,7 @@ _RECORD: Any = np.record
 
 
 class _Fields(_RECORD):
-    """A record whose fields are attributes, those too that NumPy has another meaning for, such as ``size``."""
+    """Record whose fields are attributes, including fields such as ``size`` that NumPy uses for something else."""
 
     def __getattribute__(self, name: str) -> Any:
         fields = object.__getattribute__(self, "dtype").fields
@@ -92,7 +105,7 @@ class _Fields(_RECORD):
 
 
 def _with_attributes(argument: Any) -> Any:
-    """A view of a record or of an array of them whose fields are attributes; of those in a named tuple, too."""
+    """View of a record, or of an array of records, with fields as attributes; named tuples are converted by entry."""
     if isinstance(argument, tuple) and hasattr(argument, "_fields"):
         return type(argument)(*map(_with_attributes, argument))
     if isinstance(argument, np.void | np.ndarray) and argument.dtype.names and argument.dtype.type is not _Fields:
@@ -101,7 +114,7 @@ def _with_attributes(argument: Any) -> Any:
 
 
 def _ignore_literals(dispatcher: Any) -> None:
-    """Have compiled callers share one specialisation for a constant and a variable of the same type."""
+    """Make compiled callers share one specialisation for constants and variables of the same type."""
     call_template = dispatcher.get_call_template
 
     def get_call_template(args: Any, kws: Any) -> Any:
@@ -113,7 +126,11 @@ def _ignore_literals(dispatcher: Any) -> None:
 
 
 def is_cached(function: Callable[..., Any]) -> bool:
-    """Whether numba's cache on disk holds a compiled form of a function of this package."""
+    """Whether numba's disk cache holds a compiled form of a function of this package.
+
+    Args:
+        function: function compiled by :func:`jit` or one of its variants.
+    """
     dispatcher: Any = function
     module, name = dispatcher.py_func.__module__.rsplit(".", 1)[-1], dispatcher.py_func.__qualname__
     path = dispatcher.stats.cache_path
@@ -121,10 +138,10 @@ def is_cached(function: Callable[..., Any]) -> bool:
 
 
 class _Compilation(event.Listener):
-    """Say on stderr that something is compiled for the first time, once for all that is compiled in a row.
+    """Print a notice on stderr when functions are compiled for the first time, once per series of compilations.
 
-    The garbage collector rests meanwhile: numba makes millions of objects that live until the end, and looking
-    through them again and again takes a tenth of the time.
+    The garbage collector is disabled during a compilation: numba creates millions of objects that live until its end,
+    and checking them repeatedly takes a tenth of the time.
     """
 
     quiet_since = -float("inf")
@@ -132,7 +149,11 @@ class _Compilation(event.Listener):
     collecting = False
 
     def on_start(self, event: Any) -> None:
-        """Note that a compilation begins, perhaps within another."""
+        """Handle the start of a compilation, possibly within another compilation.
+
+        Args:
+            event: numba's event, which holds the function to compile.
+        """
         function = event.data["dispatcher"].py_func
         pause = perf_counter() - self.quiet_since
         if self.depth == 0:
@@ -149,7 +170,11 @@ class _Compilation(event.Listener):
         self.quiet_since = perf_counter()
 
     def on_end(self, event: Any) -> None:
-        """Note that a compilation has ended just now."""
+        """Handle the end of a compilation.
+
+        Args:
+            event: numba's event, unused.
+        """
         self.depth -= 1
         if self.depth == 0 and self.collecting:
             gc.enable()

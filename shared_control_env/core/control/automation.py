@@ -1,7 +1,7 @@
 """The automation: nonlinear model predictive control (Eq. 12, 13) by Gauss-Newton SQP.
 
-The cost is a sum of squares, so each iteration linearises the residuals along the rollout of the
-implicit model, solves the box-bounded quadratic program for a step and searches along it.
+The cost is a sum of squares. Each iteration linearises the residuals along the rollout of the implicit model, solves
+the quadratic program with box bounds for a step, and makes a line search along the step.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from shared_control_env.core.risk.lateral import continuous_field
 from shared_control_env.core.world.vehicle import PSI, V_X, R, S, Y, implicit_step, implicit_step_jacobian
 
 CONVERGED, ITERATION_LIMIT, FAILED = 0, 1, 2
-"""Statuses: stationary to :data:`TOLERANCE`, stopped before that, or not a finite number."""
+"""Statuses: stationary to :data:`TOLERANCE`; stopped before that; a value that is not finite."""
 
 TOLERANCE = 1e-8
-"""Projected gradient, in commands scaled to their limits, under which the solution is stationary."""
+"""Projected gradient below which the solution counts as stationary [-], with commands divided by their limits."""
 
 _ARMIJO = 1e-4
 _SHORTEST_STEP = 1e-3
@@ -38,16 +38,16 @@ def cost(U: np.ndarray, scene: Scene, p: Parameters, work: Workspace) -> float:
         J = sum_{i=1}^{H_p} R P(i)^2 + W (y(i) - y_target)^2 + H (v_x(i) - v_target)^2 + N r'(i)^2
             + sum_{j=0}^{H_c-1} Q_a a(j)^2 + Q_delta delta(j)^2
 
-    with P the boundaries' field less its value at the cut-off and ``r'(i) = (r(i) - r(i-1)) / dt``.
+    where P is the field of the boundaries minus its value at the cut-off, and ``r'(i) = (r(i) - r(i-1)) / dt``.
 
     Args:
-        U: commands ``[a, delta]``, shape (>= H_c, 2).
+        U: commands ``[a, delta]`` [m/s^2, rad], shape (>= H_c, 2).
         scene: record of :data:`records.SCENE`.
-        p: record or tuple of :class:`Parameters`.
+        p: record or named tuple of :class:`Parameters`.
         work: record of :data:`condensing.WORKSPACE`.
 
     Returns:
-        J.
+        J [-].
     """
     w = p.automation
     z, z_next = work.z, work.z_next
@@ -77,13 +77,16 @@ def cost(U: np.ndarray, scene: Scene, p: Parameters, work: Workspace) -> float:
 
 @jit
 def linearise(U: np.ndarray, scene: Scene, p: Parameters, work: Workspace) -> float:
-    """Quadratic model of half the cost about U: fills ``work.gradient`` and ``work.hessian``.
+    """Write the quadratic model of half the cost about U to ``work.gradient`` and ``work.hessian``.
 
     Args:
-        U, scene, p, work: as in :func:`cost`.
+        U: commands ``[a, delta]`` [m/s^2, rad], shape (>= H_c, 2).
+        scene: record of :data:`records.SCENE`.
+        p: record or named tuple of :class:`Parameters`.
+        work: record of :data:`condensing.WORKSPACE`, written.
 
     Returns:
-        The cost at U, as :func:`cost`.
+        The cost J at U, as :func:`cost`.
     """
     w = p.automation
     z, z_next = work.z, work.z_next
@@ -115,16 +118,16 @@ def linearise(U: np.ndarray, scene: Scene, p: Parameters, work: Workspace) -> fl
 
 @jit
 def projected_gradient(U: np.ndarray, gradient: np.ndarray, H_c: int, limits: Limits) -> float:
-    """Stationarity of a bounded problem: ``max |u - clip(u - g)|`` in commands scaled to their limits.
+    """Stationarity measure of a bounded problem: ``max |u - clip(u - g)|`` for commands u divided by their limits.
 
     Args:
-        U: commands, shape (>= H_c, 2).
-        gradient: of half the cost, shape (>= 2 H_c,).
-        H_c: commands in play.
-        limits: bounds.
+        U: commands ``[a, delta]`` [m/s^2, rad], shape (>= H_c, 2).
+        gradient: gradient of half the cost, shape (>= 2 H_c,).
+        H_c: control horizon: number of commands [-].
+        limits: bounds of the commands.
 
     Returns:
-        0 at a stationary point.
+        The measure [-]; 0 at a stationary point.
     """
     largest = 0.0
     for j in range(H_c):
@@ -137,7 +140,7 @@ def projected_gradient(U: np.ndarray, gradient: np.ndarray, H_c: int, limits: Li
 
 @jit_inlined
 def _plan_step(U: np.ndarray, p: Parameters, work: Workspace) -> float:
-    """Step to the quadratic model's minimum within the bounds, in ``work.step``; return the cost's slope along it."""
+    """Write the step to the quadratic model's bounded minimum to ``work.step``; return the cost's slope along it."""
     n = 2 * p.automation.H_c
     for c in range(n):
         bound = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
@@ -165,18 +168,20 @@ def _plan_step(U: np.ndarray, p: Parameters, work: Workspace) -> float:
 def solve(
     U: np.ndarray, scene: Scene, p: Parameters, iterations: int, work: Workspace
 ) -> tuple[int, int, float, float]:
-    """Minimise Eq. 13 over the bounded commands, from the guess U.
+    """Minimise Eq. 13 over the bounded commands, starting from the guess U.
 
-    Each step is halved until the cost falls enough (Armijo). A step is tried by linearising there, which the
-    next iteration needs anyhow; the last one by the cost alone.
+    Each step is halved until the cost decreases enough (Armijo). A trial point is linearised, since the next iteration
+    needs the linearisation anyway; in the last iteration only the cost is computed.
 
     Args:
-        U: first guess, overwritten with the solution, shape (>= H_c, 2).
-        scene, p, work: as in :func:`cost`.
-        iterations: limit of Gauss-Newton iterations.
+        U: initial guess ``[a, delta]`` [m/s^2, rad], overwritten with the solution, shape (>= H_c, 2).
+        scene: record of :data:`records.SCENE`.
+        p: record or named tuple of :class:`Parameters`.
+        iterations: largest number of Gauss-Newton iterations.
+        work: record of :data:`condensing.WORKSPACE`.
 
     Returns:
-        Status, iterations done, projected gradient at the last linearisation, cost.
+        Status, number of iterations, projected gradient at the last linearisation [-], and cost [-].
     """
     H_c = p.automation.H_c
     value = linearise(U, scene, p, work)
@@ -208,17 +213,22 @@ def solve(
 
 @jit
 def shift(U: np.ndarray, H_c: int) -> None:
-    """Warm start: move the H_c commands one step forward in place and repeat the last."""
+    """Warm start: move the commands one step forward in place and repeat the last command.
+
+    Args:
+        U: commands ``[a, delta]`` [m/s^2, rad], overwritten, shape (>= H_c, 2).
+        H_c: control horizon: number of commands [-].
+    """
     for j in range(H_c - 1):
         U[j, 0], U[j, 1] = U[j + 1, 0], U[j + 1, 1]
 
 
 @jit
 def clear_sequence(U: np.ndarray) -> None:
-    """A sequence of commands that does nothing.
+    """Set a sequence of commands to zero.
 
     Args:
-        U: commands, overwritten, shape (n, 2).
+        U: commands ``[a, delta]`` [m/s^2, rad], overwritten, shape (n, 2).
     """
     for j in range(U.shape[0]):
         U[j, 0], U[j, 1] = 0.0, 0.0
@@ -226,10 +236,10 @@ def clear_sequence(U: np.ndarray) -> None:
 
 @jit_inlined
 def clear_automation(memory: AutomationMemory) -> None:
-    """State of an automation that has not run.
+    """Reset the automation's memory to its state before the first step.
 
     Args:
-        memory: record of :data:`records.AUTOMATION_MEMORY`.
+        memory: record of :data:`records.AUTOMATION_MEMORY`, overwritten.
     """
     clear_sequence(memory.U)
     memory.u_a_des[0], memory.u_a_des[1] = 0.0, 0.0
@@ -237,18 +247,18 @@ def clear_automation(memory: AutomationMemory) -> None:
 
 
 def automate(scene: Scene, p: Parameters, memory: AutomationMemory, work: Workspace) -> tuple[int, int, float]:
-    """The automation's desired command u_a,des (Eq. 13), left in ``memory.u_a_des``.
+    """Compute the automation's desired command u_a,des (Eq. 13) and write it to ``memory.u_a_des``.
 
-    When the solver fails the last feasible command is held and the failure counted.
+    If the solver fails, the last feasible command is held and the failure is counted.
 
     Args:
-        scene: record of :data:`records.SCENE`, its safe area found.
+        scene: record of :data:`records.SCENE` with the safe area.
         p: parameters.
-        memory: record of :data:`records.AUTOMATION_MEMORY`.
+        memory: record of :data:`records.AUTOMATION_MEMORY`, updated.
         work: record of :data:`condensing.WORKSPACE`.
 
     Returns:
-        Status, iterations and residual of :func:`solve`.
+        Status, number of iterations and residual of :func:`solve`.
     """
     iterations = p.solver.first_iterations if scene.k == 0 else p.solver.iterations
     status, done, residual, _ = solve(memory.U, scene, p, iterations, work)
@@ -262,4 +272,4 @@ def automate(scene: Scene, p: Parameters, memory: AutomationMemory, work: Worksp
 
 
 AUTOMATE = Interface((int, int, float), Scene, Parameters, AutomationMemory, Workspace)
-"""``automate(scene, p, memory, work)``, compiled apart from the loop."""
+"""``automate(scene, p, memory, work)``, compiled separately from the loop."""

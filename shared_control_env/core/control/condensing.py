@@ -1,8 +1,8 @@
-"""Condensing: the quadratic model of a predictive controller's cost in its commands alone.
+"""Condensing: a quadratic model of a predictive controller's cost as a function of its commands alone.
 
-Shared by both controllers. The decision is ``U``, H_c commands ``[a, delta]``, the last held to the end of
-the horizon; n = 2 H_c columns. Sensitivities ``dz(i)/dU`` follow the linearised step, and every residual
-of the least-squares cost adds its square to the gradient and the Gauss-Newton Hessian of half the cost.
+Both controllers use this model. The variables are ``U``, H_c commands ``[a, delta]``, which make n = 2 H_c columns. The
+last command is held to the end of the horizon. The sensitivities ``dz(i)/dU`` follow from the linearised steps. The
+square of each residual of the cost is added to the gradient and to the Gauss-Newton Hessian of half the cost.
 """
 
 from __future__ import annotations
@@ -19,31 +19,26 @@ from shared_control_env.core.world.vehicle import PSI, V_X, V_Y, R, S, Y
 _N = 2 * MAX_CONTROL
 
 _LANES = 4
-"""Loops run over whole fours of columns, of which LLVM makes vector instructions; those beyond n are zero."""
+"""Loops run over a multiple of this number of columns, so that LLVM vectorises them; columns beyond n are zero."""
 
 
 class Workspace:
-    """Scratch of one solver; one record a thread serves any number of environments.
+    """Scratch memory of one solver; one record per thread serves any number of environments.
 
     Attributes:
-        z: states along the rollout.
-        z_next: see above.
-        A: derivatives of one step.
-        B: see above.
-        affine: of one step linearised, A z + B u + affine.
+        z, z_next: states before and after one step of the rollout.
+        A, B: derivatives of one step with respect to the state and to the command.
+        affine: constant part of one linearised step, A z + B u + affine.
         sensitivity: derivative of the state with respect to U.
-        yaw_step: the same of the change of the yaw rate over the last step.
-        row: derivative of one residual.
-        gain: derivative of the arm's command, of a driver who models it.
-        gradient: of half the cost.
-        hessian: Gauss-Newton, of half the cost.
-        step: of the commands.
-        low: bounds of the step.
-        high: see above.
-        trial: commands that a step starts from.
-        factor: scratch of the quadratic program.
-        solution: see above.
-        bound: see above.
+        yaw_step: derivative of the change of the yaw rate over the last step with respect to U.
+        row: derivative of one residual with respect to U.
+        gain: derivative of the arm's command with respect to U, for a driver with the internal model.
+        gradient: gradient of half the cost.
+        hessian: Gauss-Newton Hessian of half the cost.
+        step: step of the commands.
+        low, high: bounds of the step.
+        trial: commands from which the step starts.
+        factor, solution, bound: scratch of the solver of the quadratic program.
     """
 
     z: Annotated[np.ndarray, (6,)]
@@ -71,7 +66,12 @@ WORKSPACE = record_dtype(Workspace)
 
 @jit_inlined
 def clear(work: Workspace, n: int) -> None:
-    """Start a condensation of n columns: zero gradient, Hessian and sensitivities of a :data:`WORKSPACE` record."""
+    """Start condensing: set gradient, Hessian and sensitivities to zero.
+
+    Args:
+        work: record of :data:`WORKSPACE`, written.
+        n: number of columns, 2 H_c.
+    """
     for c in range(_whole_lanes(n)):
         work.gradient[c] = work.yaw_step[c] = 0.0
         for e in range(_whole_lanes(n)):
@@ -82,20 +82,18 @@ def clear(work: Workspace, n: int) -> None:
 
 @jit
 def _whole_lanes(n: int) -> int:
-    """Columns up to which a loop over n of them runs."""
+    """Number of columns over which a loop for n columns runs: n rounded up to a multiple of :data:`_LANES`."""
     return (n + _LANES - 1) // _LANES * _LANES
 
 
 @jit_inlined
 def propagate(work: Workspace, n: int) -> None:
-    """Carry the sensitivity over a step: ``A sens``, plus B in the last two of the n columns in play.
-
-    Uses the zeros of A: nothing but s depends on s, and the velocities depend on velocities alone.
+    """Propagate the sensitivity over one step: ``A sens``, plus B in the last two of the n active columns.
 
     Args:
-        work: record of :data:`WORKSPACE`; ``A`` and ``B`` hold the step's derivatives, ``sensitivity`` and
+        work: record of :data:`WORKSPACE`; ``A`` and ``B`` hold the derivatives of the step, ``sensitivity`` and
             ``yaw_step`` are written.
-        n: columns in play: 2 for every command used so far.
+        n: number of active columns: 2 for every command used so far.
     """
     B, sens, yaw_step = work.B, work.sensitivity, work.yaw_step
     carry(work, n)
@@ -107,7 +105,15 @@ def propagate(work: Workspace, n: int) -> None:
 
 @jit_inlined
 def carry(work: Workspace, n: int) -> None:
-    """The part of :func:`propagate` that is ``A sens``; arguments as there."""
+    """Propagate the sensitivity over one step without the effect of the command: ``A sens``.
+
+    The function uses the zeros of A: only s depends on s, and the velocities depend only on velocities.
+
+    Args:
+        work: record of :data:`WORKSPACE`; ``A`` holds the derivative of the step, ``sensitivity`` and ``yaw_step`` are
+            written.
+        n: number of active columns.
+    """
     A, sens, yaw_step = work.A, work.sensitivity, work.yaw_step
     a_s = A[S, Y], A[S, PSI], A[S, V_X], A[S, V_Y], A[S, R]
     a_y = A[Y, Y], A[Y, PSI], A[Y, V_X], A[Y, V_Y], A[Y, R]
@@ -128,15 +134,15 @@ def carry(work: Workspace, n: int) -> None:
 
 @jit_inlined
 def add_square(work: Workspace, weight: float, residual: float, n: int) -> float:
-    """Add ``weight (residual + row . dU)^2`` to the model.
+    """Add the term ``weight (residual + row . dU)^2`` to the quadratic model.
 
     Args:
-        work: record of :data:`WORKSPACE`; ``row`` holds the residual's derivative, zero beyond n.
-        weight, residual: of the term.
-        n: columns in play.
+        work: record of :data:`WORKSPACE`; ``row`` holds the derivative of the residual, with zeros beyond n.
+        weight, residual: weight and residual of the term.
+        n: number of active columns.
 
     Returns:
-        The term's value, ``weight residual^2``.
+        Value of the term, ``weight residual^2``.
     """
     row, gradient, hessian = work.row, work.gradient, work.hessian
     for c in range(n):
@@ -158,21 +164,21 @@ def add_tracking(
     v_target: float,
     n: int,
 ) -> float:
-    """Add the terms of one stage that Eq. 13 and Eq. 15 share.
+    """Add the terms of one stage that Eq. 13 and Eq. 15 have in common.
 
     ``W (y - y_target)^2 + H (v_x - v_target)^2 + N r'^2`` with ``r'(i) = (r(i) - r(i-1)) / dt``, which is exact
     for the implicit step.
 
     Args:
-        work: record of :data:`WORKSPACE`, its ``sensitivity`` and ``yaw_step`` those after the stage.
-        weights: W, H and N.
+        work: record of :data:`WORKSPACE`; ``sensitivity`` and ``yaw_step`` hold their values after the stage.
+        weights: parameters with the weights W, H and N.
         dt: step [s].
         z, z_next: state before and after the stage, shape (6,).
         y_target, v_target: lateral position [m] and speed [m/s] to track.
-        n: columns in play.
+        n: number of active columns.
 
     Returns:
-        The terms' value.
+        Sum of the terms [-].
     """
     gradient, hessian, sens, yaw_step = work.gradient, work.hessian, work.sensitivity, work.yaw_step
     W, H, N = weights.W, weights.H, weights.N / (dt * dt)
@@ -187,7 +193,16 @@ def add_tracking(
 
 @jit_inlined
 def add_effort(work: Workspace, weights: PredictiveParameters, U: np.ndarray) -> float:
-    """Add the effort ``sum_j Q_a a(j)^2 + Q_delta delta(j)^2`` of the commands; return its value."""
+    """Add the effort ``sum_j Q_a a(j)^2 + Q_delta delta(j)^2`` of the commands.
+
+    Args:
+        work: record of :data:`WORKSPACE`; gradient and Hessian are written.
+        weights: parameters with the weights Q_a and Q_delta and the control horizon H_c.
+        U: commands ``[a, delta]`` [m/s^2, rad], shape (>= H_c, 2).
+
+    Returns:
+        Value of the effort [-].
+    """
     value = 0.0
     for j in range(weights.H_c):
         for channel in range(2):

@@ -1,25 +1,26 @@
 """The driver's predictive controller (Eq. 14, 15) as a quadratic program.
 
-The costs are the automation's without the potential field; the model is linearised about the current
-state and the last command, so that the program is quadratic. Its variables are the H_c commands, scaled
-to their limits, and one slack eps >= 0 with an exact (linear) penalty that softens the rows of the safe area C:
-the program is always feasible, and eps is 0 where the rows can be kept at a cost below the penalty's.
+The cost is that of the automation without the potential field. The model is linearised about the current state and the
+last command, so that the program is quadratic. Its variables are the H_c commands, divided by their limits, and one
+slack eps >= 0. The slack has an exact (linear) penalty and softens the rows of the safe area C. The program is thus
+always feasible, and eps is 0 where the rows can be satisfied at a lower cost than that of the penalty.
 
 ::
 
     min  x^T P x / 2 + q^T x      subject to   low <= A x <= high,    x = [U / bound, eps]
     rows:  y(i) - eps <= upper(i),   y(i) + eps >= lower(i),   -1 <= U / bound <= 1,   eps >= 0
 
-The paper's driver takes its desired command for the one that drives the car, and so knows neither its own lag nor the
-automation beside it. With the internal model both are in the program, the variables still being u_h,des::
+The paper's driver assumes that its desired command drives the car. It knows neither its own lag nor the automation's
+command. The internal model adds both to the program; the variables are still u_h,des::
 
     u(i)         = u_a,act + u_h,act(i)             u_a,act: as felt last, held over the horizon
     u_h,act(i+1) = phi u_h,act(i) + K_h (1 - phi) (u_h,des(i) - u_a,act),   phi = exp(-dt / T_h)
     z(i+1)       = A z(i) + B u(i) + affine
 
-with K_h and T_h as the driver believes them to be. What counts as effort is then the command that drives the car, at
-the H_c stages from the first that can be changed on, and a little of u_h,des. One more row keeps s(H_p) - eps in C,
-whose end is the clearance behind the preceding vehicle; the paper's program keeps the lateral position alone in C.
+with K_h and T_h as the driver assumes them. The effort then has two parts: the command that drives the car, at H_c
+stages from the first stage on that the driver can still influence; and u_h,des with a small weight. One more row keeps
+s(H_p) - eps in C, which ends at the clearance behind the preceding vehicle. The paper's program constrains only the
+lateral position to C.
 """
 
 from __future__ import annotations
@@ -45,38 +46,45 @@ from shared_control_env.core.risk.safe_area import lateral_bounds
 from shared_control_env.core.world.vehicle import PSI, V_X, V_Y, R, S, Y, implicit_step_jacobian
 
 SLACK_LINEAR = 200.0
-"""Penalty of the slack [1/m]. It is exact where the rows' multipliers sum to less.
+"""Linear penalty of the slack [1/m]. The penalty is exact where the sum of the rows' multipliers is smaller.
 
-In 50 000 random scenes the sum was at most 61 within 1.9 m of the lane's centre; from the lane's edge on it grows
-without bound, since the first row takes large steering to move, and there the slack gives way by some
-centimetres instead. A penalty of 2000 makes OSQP miss its tolerance now and then.
+In 50 000 random scenes this sum was at most 61 within 1.9 m of the centre of the lane. Beyond the edge of the lane the
+sum grows without bound, since large steering is needed to change the first row; there the slack becomes some
+centimetres instead. With a penalty of 2000, OSQP sometimes misses its tolerance.
 """
 
 SLACK_QUADRATIC = 1.0
-"""Curvature of the slack's penalty [1/m^2], which makes the program strictly convex."""
+"""Quadratic penalty of the slack [1/m^2], which makes the program strictly convex."""
 
 
 SHARE_OF_DESIRED = 0.01
-"""Weight of u_h,des over that of the command that drives the car, in the program with the internal model."""
+"""Weight of u_h,des divided by the weight of the command that drives the car, with the internal model [-]."""
 
 
 @jit
 def count_rows(p: Parameters) -> int:
-    """Rows of the program: both sides of C at every stage, C's end with the internal model, and one a variable."""
+    """Number of rows of the program.
+
+    There is one row for each side of C at every stage, one for the end of C with the internal model, and one for each
+    variable.
+
+    Args:
+        p: parameters.
+    """
     return 2 * p.driver.H_p + (1 if p.internal_model.active else 0) + 2 * p.driver.H_c + 1
 
 
 @jit_inlined
 def add_arm(i: int, command: tuple[float, float], p: Parameters, n: int, work: Workspace) -> None:
-    """The command u(i) that drives the car at stage i, of a driver with the internal model: its effects and its effort.
+    """Add the effect and the effort of the command u(i) that drives the car at stage i, with the internal model.
 
     Args:
-        i: stage.
-        command: u(i) where u_h,des is zero [m/s^2, rad].
+        i: index of the stage.
+        command: u(i) for u_h,des = 0, ``(a, delta)`` [m/s^2, rad].
         p: parameters.
-        n: columns of the program.
-        work: record of :data:`condensing.WORKSPACE`: ``gain`` holds du_h,act(i)/dU; the sensitivities of the next state
-            and the quadratic model are added to.
+        n: number of columns of the program, 2 H_c.
+        work: record of :data:`condensing.WORKSPACE`. ``gain`` holds du_h,act(i)/dU. The effect is added to the
+            sensitivities of the next state, the effort to the quadratic model.
     """
     B, sens, gain = work.B, work.sensitivity, work.gain
     for c in range(n):
@@ -106,16 +114,19 @@ def build_program(
 ) -> None:
     """Condense the driver's problem into dense matrices.
 
+    The paper's model is linearised about the driver's last desired command. The internal model is linearised about the
+    sum of the driver's present actual command and the automation's command as last felt.
+
     Args:
-        scene: record of :data:`records.SCENE`, its safe area found.
-        u_last: the driver's last desired command, about which the paper's model is linearised, shape (2,).
-        u_h_act: what the arm gives now, u_h,act(k), about which, with the automation's, the other is, shape (2,).
+        scene: record of :data:`records.SCENE` with the safe area.
+        u_last: the driver's last desired command [m/s^2, rad], shape (2,).
+        u_h_act: the driver's present actual command u_h,act(k) [m/s^2, rad], shape (2,).
         p: parameters.
         work: record of :data:`condensing.WORKSPACE`.
-        P: written, symmetric, shape (n + 1, n + 1) with n = 2 H_c.
-        q: written, shape (n + 1,).
-        A: written, shape (:func:`count_rows`, n + 1).
-        low, high: written, of as many entries.
+        P: quadratic cost, symmetric, written, shape (n + 1, n + 1) with n = 2 H_c.
+        q: linear cost, written, shape (n + 1,).
+        A: constraint matrix, written, shape (:func:`count_rows`, n + 1).
+        low, high: bounds of the rows of A, written, one entry per row.
     """
     w, dt = p.driver, p.task.dt
     n = 2 * w.H_c
@@ -134,7 +145,7 @@ def build_program(
         a, delta = scene.felt[0] + arm_a, scene.felt[1] + arm_delta
         for c in range(n):
             work.gain[c] = 0.0
-    # A command that would stop the car within the step hides that it can start off: linearise at rest.
+    # A command that would stop the car within the step hides that the car can start to move. Linearise at rest instead.
     a = max(a, -z[V_X] / dt - z[R] * z[V_Y])
     heading, wheel = (cos(scene.z[PSI]), sin(scene.z[PSI])), (cos(delta), sin(delta))
     rows = count_rows(p)
@@ -143,7 +154,7 @@ def build_program(
             A[i, c] = 0.0
     for i in range(H_p):
         columns = 2 * min(i, w.H_c - 1) + 2
-        # z(i+1) = A z(i) + B u(i) + affine, with A, B and affine at the current state; they vary with kappa alone.
+        # z(i+1) = A z(i) + B u(i) + affine, with A, B and affine at the current state; they vary only with kappa.
         if i == 0 or scene.kappa[i] != scene.kappa[i - 1]:
             implicit_step_jacobian(
                 scene.z, heading, a, delta, wheel, scene.kappa[i], dt, p.model, affine, work.A, work.B
@@ -172,7 +183,7 @@ def build_program(
         else:
             propagate(work, columns)
         add_tracking(work, w, dt, z, z_next, scene.y_target, scene.v_target, columns)
-        # The rows of C are taken where the car gets to under the last command.
+        # The rows of C are evaluated at the path length that the car reaches under the last command.
         station = z_next[S]
         for c in range(columns):
             if internal:

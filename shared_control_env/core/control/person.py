@@ -1,8 +1,9 @@
-"""A person at the wheel: what is between the eye and the desired command of the predictive driver.
+"""A person at the wheel: perception, attention and arm of the predictive driver.
 
-Perception comes late, and errs in proportion to what is perceived; the person makes up for the delay with the own model
-of the car. Hands that rest follow the wheel until something is noticed, and act a while after that. The arm errs in
-proportion to what it does. The numbers and their sources are in :class:`core.parameters.PersonParameters`.
+Perception is delayed, and its error is proportional to the perceived quantity. The person compensates for the delay
+with a model of the car. Resting hands follow the wheel until the person notices something; the person then acts after a
+response time. The error of the arm is proportional to its command. The numbers and their sources are in
+:class:`core.parameters.PersonParameters`.
 """
 
 from __future__ import annotations
@@ -19,26 +20,27 @@ from shared_control_env.core.world.scene import gap_ahead
 from shared_control_env.core.world.vehicle import PSI, V_X, Y, implicit_step
 
 REASONS = ("nothing", "lane position", "heading", "headway", "felt steering", "felt acceleration", "display")
-"""What a person may notice; a reason's index is its code."""
+"""What a person may notice; the index of a reason is its code."""
 
 NOTHING, LANE_POSITION, HEADING, HEADWAY, FELT_STEERING, FELT_ACCELERATION, DISPLAY = range(7)
 
 LATERAL, DIRECTION, SPEED, ARM = range(4)
-"""Places of the errors in a person's memory."""
+"""Indices of the errors in a person's memory."""
 
 ADJUSTING = 2.0
-"""Time in which a person would bring the speed to the target speed [s]; assumed."""
+"""Time constant with which a person would approach the target speed [s]; assumed."""
 
 _RESPONSE = 1_000_000_000
-"""Counter of the random number that the response time is drawn with; those of the steps are smaller."""
+"""Counter of the random number for the response time; the counters of the steps are smaller."""
 
 
 @jit
 def clear_person(memory: PersonMemory, p: Parameters) -> None:
-    """Begin an episode: who drives from the start does so now, the others rest.
+    """Reset the person's memory at the start of an episode; the parameters say whether the person drives already.
 
     Args:
-        memory: record of :data:`records.PERSON_MEMORY`; the past is written before it is read.
+        memory: record of :data:`records.PERSON_MEMORY`, overwritten except for the past, which is always written
+            before it is read.
         p: parameters.
     """
     memory.engaged = p.person.engaged
@@ -50,28 +52,37 @@ def clear_person(memory: PersonMemory, p: Parameters) -> None:
 
 @jit
 def advance_errors(memory: PersonMemory, k: int, p: Parameters) -> None:
-    """Errors of perception and arm, each a first-order process of unit variance and the person's noise time."""
+    """Advance the errors of perception and arm to step k.
+
+    Each error is a first-order process of unit variance with the person's noise time.
+
+    Args:
+        memory: record of :data:`records.PERSON_MEMORY`; ``error`` is written.
+        k: index of the time step.
+        p: parameters.
+    """
     for i in range(4):
         memory.error[i] = coloured(memory.error[i], p.person.seed, 4 * k + i, k, p.person.noise_time, p.task.dt)
 
 
 @jit
 def perceive_late(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Parameters, seen: Scene) -> None:
-    """What the person takes the car's motion for: that of a while ago, carried on by the own model, with an error.
+    """Compute the car's motion as the person perceives it: a delayed state, predicted to the present, with errors.
 
     ::
 
         z_seen = f(... f(z(k - d), u(k - d)) ..., u(k - 1)),   d = delay / dt, f the model of the controllers
         y, psi, v_x:  error (1 + weber n),   with the errors from target, road and target speed
 
-    The road ahead and the other vehicles are seen as they are; the curvature at the car stands for that on the way.
+    The person perceives the road ahead and the other vehicles correctly. The prediction uses the present curvature at
+    the car for the whole delay.
 
     Args:
         scene: record of :data:`records.SCENE`.
-        u_last: command that drove the car in the step before, shape (2,) [m/s^2, rad].
-        memory: record of :data:`records.PERSON_MEMORY`.
+        u_last: command that drove the car in the previous step [m/s^2, rad], shape (2,).
+        memory: record of :data:`records.PERSON_MEMORY`; the past states and commands are updated.
         p: parameters.
-        seen: record of :data:`records.SCENE`, a copy of the scene; its ``z`` is written.
+        seen: copy of the scene, record of :data:`records.SCENE`; ``z`` is written.
     """
     k, z = scene.k, seen.z
     for i in range(6):
@@ -93,11 +104,14 @@ def perceive_late(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Par
 
 @jit
 def what_is_noticed(seen: Scene, p: Parameters) -> int:
-    """The first reason of :data:`REASONS` that a scene gives to take over, as it is seen; nothing is felt at k = 0.
+    """First of the :data:`REASONS` that a perceived scene gives to take over; at k = 0 nothing is felt at the wheel.
 
     Args:
-        seen: record of :data:`records.SCENE`.
+        seen: the scene as the person perceives it, record of :data:`records.SCENE`.
         p: parameters.
+
+    Returns:
+        Index in :data:`REASONS`; NOTHING if there is no reason.
     """
     person, z = p.person, seen.z
     if abs(z[Y] - seen.y_target) > person.lane_position:
@@ -117,23 +131,27 @@ def what_is_noticed(seen: Scene, p: Parameters) -> int:
 
 @jit
 def response_time(p: Parameters) -> float:
-    """The person's time from noticing to acting [s]: log-normal, the same throughout an episode."""
+    """Time from noticing to acting [s]: log-normal over persons, constant throughout an episode.
+
+    Args:
+        p: parameters.
+    """
     return p.person.response * exp(p.person.response_spread * standard_normal(p.person.seed, _RESPONSE))
 
 
 @jit_inlined
 def take_in(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Parameters, seen: Scene) -> bool:
-    """One step of a person, before the command: what is seen, and whether the person drives.
+    """Advance a person by one step, up to the command: compute the perceived scene and whether the person drives.
 
     Args:
         scene: record of :data:`records.SCENE`.
-        u_last: command that drove the car in the step before, shape (2,).
-        memory: record of :data:`records.PERSON_MEMORY`.
+        u_last: command that drove the car in the previous step [m/s^2, rad], shape (2,).
+        memory: record of :data:`records.PERSON_MEMORY`, updated.
         p: parameters.
-        seen: record of :data:`records.SCENE`, a copy of the scene, changed to what is seen.
+        seen: copy of the scene, record of :data:`records.SCENE`; changed to the perceived scene.
 
     Returns:
-        Whether the person drives; else the hands rest, so that u_h,des is what is felt of the automation.
+        Whether the person drives. If not, the hands rest, and u_h,des is the command of the automation as felt.
     """
     if scene.k == 0:
         clear_person(memory, p)
@@ -150,7 +168,13 @@ def take_in(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Parameter
 
 @jit
 def with_arm_noise(u_h_des: np.ndarray, memory: PersonMemory, p: Parameters) -> None:
-    """Signal-dependent noise of the arm: the command times ``1 + arm_noise n``, within the limits; shape (2,)."""
+    """Apply the signal-dependent noise of the arm: multiply the command by ``1 + arm_noise n``, and clip the result.
+
+    Args:
+        u_h_des: the driver's desired command [m/s^2, rad], overwritten, shape (2,).
+        memory: record of :data:`records.PERSON_MEMORY`, which holds the present error n of the arm.
+        p: parameters.
+    """
     scale = 1.0 + p.person.arm_noise * memory.error[ARM]
     u_h_des[0] = min(max(scale * u_h_des[0], -p.limits.a_max), p.limits.a_max)
     u_h_des[1] = min(max(scale * u_h_des[1], -p.limits.delta_max), p.limits.delta_max)

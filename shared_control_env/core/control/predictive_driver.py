@@ -1,4 +1,4 @@
-"""The predictive driver as the kernel runs it: the program of :mod:`control.driver` by the active-set method."""
+"""The predictive driver in the kernel: the program of :mod:`control.driver`, solved by the active-set method."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from shared_control_env.core.records import Memory, PersonMemory, Scene, Vector2
 
 
 class Program:
-    """The driver's quadratic program, and what it is solved in.
+    """The driver's quadratic program, its solution and its scratch memory.
 
     Attributes:
-        active_set: scratch of its solver.
+        active_set: scratch of the solver.
         P, q, A, low, high: the program, see :func:`control.driver.build_program`.
-        x: its solution.
-        multipliers: of its rows.
-        seen: the scene as a person sees it.
-        command: the driver's, ``[a, delta]`` [m/s^2, rad].
+        x: solution of the program.
+        multipliers: multipliers of the rows.
+        seen: the scene as a person perceives it.
+        command: the driver's desired command ``[a, delta]`` [m/s^2, rad].
     """
 
     active_set: active_set.Workspace
@@ -45,16 +45,16 @@ PROGRAM = record_dtype(Program)
 
 
 class DriverReport:
-    """How the driver came to the command, as ``info["driver"]``: its solver, and the person.
+    """Outcome of the driver's solver and state of the person, reported as ``info["driver"]``.
 
     Attributes:
         status: active_set.SOLVED, ITERATION_LIMIT or FAILED.
-        iterations: rows added and dropped.
-        primal_residual, dual_residual: of the program.
-        failures: steps so far at which the last command was held.
-        engaged: whether a person drives; else the hands rest.
-        noticed: when a person at rest noticed something [s]; infinite before.
-        reason: what it was, index in person.REASONS.
+        iterations: number of rows added and dropped.
+        primal_residual, dual_residual: residuals of the solution.
+        failures: number of steps so far at which the solver failed, so that the last command was held.
+        engaged: whether the person drives; if not, the hands rest.
+        noticed: time at which a person with resting hands noticed something [s]; infinite before.
+        reason: what the person noticed, index in person.REASONS.
     """
 
     status: int
@@ -72,11 +72,11 @@ DRIVER_REPORT = record_dtype(DriverReport)
 
 @jit_inlined
 def clear_report(engaged: bool, report: DriverReport) -> None:
-    """Report of a driver that has not driven.
+    """Reset the driver's report at the start of an episode.
 
     Args:
         engaged: whether the driver drives from the start.
-        report: record of :data:`DRIVER_REPORT`.
+        report: record of :data:`DRIVER_REPORT`, overwritten.
     """
     report.status, report.iterations, report.failures = 0, 0, 0
     report.primal_residual, report.dual_residual = 0.0, 0.0
@@ -92,18 +92,18 @@ def drive(
     program: Program,
     report: DriverReport,
 ) -> None:
-    """The predictive driver's command (Eq. 15), or a person's, left in ``program.command``.
+    """Compute the command of the predictive driver (Eq. 15) or of a person, and write it to ``program.command``.
 
-    Hands that rest follow what they feel of the automation. When the solver fails the last command is held and the
-    failure counted.
+    Resting hands follow the command of the automation that they feel. If the solver fails, the last command is held
+    and the failure is counted.
 
     Args:
         scene: record of :data:`records.SCENE`.
         p: parameters.
-        memory: record of :data:`records.MEMORY`.
-        person: record of :data:`records.PERSON_MEMORY`.
+        memory: record of :data:`records.MEMORY`; failures are counted in it.
+        person: record of :data:`records.PERSON_MEMORY`, updated if the driver is a person.
         work: record of :data:`condensing.WORKSPACE`.
-        program: record of :data:`PROGRAM`.
+        program: record of :data:`PROGRAM`, written.
         report: record of :data:`DRIVER_REPORT`, written.
     """
     if not p.person.active:
@@ -125,7 +125,7 @@ def drive(
 def _solve(
     scene: Scene, p: Parameters, memory: Memory, work: Workspace, program: Program, report: DriverReport
 ) -> None:
-    """The program of a scene as the driver sees it; arguments as those of :func:`drive`."""
+    """Build and solve the program for a scene as the driver perceives it; the arguments are those of :func:`drive`."""
     g = program
     build_program(scene, memory.u_h_des, memory.u_h_act, p, work, g.P, g.q, g.A, g.low, g.high)
     n, m = 2 * p.driver.H_c + 1, count_rows(p)
@@ -142,4 +142,4 @@ def _solve(
 
 
 DRIVE = Interface(None, Scene, Parameters, Memory, PersonMemory, Workspace, Program, DriverReport)
-"""``drive(scene, p, memory, person, work, program, report)``, compiled apart from the loop."""
+"""``drive(scene, p, memory, person, work, program, report)``, compiled separately from the loop."""

@@ -68,7 +68,7 @@ class Kind(NamedTuple):
         act: function that returns the degraded command of one channel, compiled with the signature :data:`ACT`.
         perceive: function that changes the automation's perception, compiled with the signature :data:`PERCEIVE`.
         advance: function that advances the memory at every step, compiled with the signature :data:`ADVANCE`.
-        heeds: fields of the settings that the kind uses beside its size: ``seed``, ``time_constant``, ``frequency``.
+        heeds: fields of the settings that the kind uses besides its size: ``seed``, ``time_constant``, ``frequency``.
         channels: channels that the settings of this kind may name. A kind that changes only the perception acts on
             none of them.
     """
@@ -185,7 +185,7 @@ KINDS: dict[str, Kind] = {
 """All kinds by name. Their order gives their codes; ``none`` has the code 0."""
 
 STANDARD = tuple(KINDS)
-"""Names of the package's own; those that others add come after them."""
+"""Names of the kinds that belong to the package; kinds added later follow them in :data:`KINDS`."""
 
 
 def add_kind(kind: Kind) -> None:

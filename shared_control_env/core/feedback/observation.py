@@ -121,7 +121,7 @@ OBSERVATIONS: dict[str, Observation] = {DRIVER_V0.name: DRIVER_V0}
 """All observations by name."""
 
 STANDARD = tuple(OBSERVATIONS)
-"""Names of the package's own; those that others add come after them."""
+"""Names of the observations that belong to the package; those added later follow them in :data:`OBSERVATIONS`."""
 
 
 def add_observation(observation: Observation) -> None:

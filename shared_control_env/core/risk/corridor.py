@@ -113,7 +113,7 @@ def orient(triangles: np.ndarray) -> None:
 
 @jit
 def _left_and_right(triangles: np.ndarray, i: int, edge: int) -> tuple[float, float, float, float]:
-    """Left end (s, d) and right end (s, d) of an edge, as seen on leaving a counter-clockwise triangle over the edge."""
+    """Left end (s, d) and right end (s, d) of an edge, as seen on leaving a counter-clockwise triangle over it."""
     right, left = triangles[i, edge], triangles[i, (edge + 1) % 3]
     return left[0], left[1], right[0], right[1]
 

@@ -7,7 +7,7 @@ so each hole covers one interval of any side; the parts of the sides that no hol
 The second step puts triangles on the edges of the boundary, one after the other (gift wrapping). The apex of a triangle
 is the visible vertex that sees the edge under the largest angle, which is the vertex with the empty circumcircle. Each
 triangle replaces its edge by its two other edges. The edges therefore always bound the region that is not yet
-triangulated, and triangles cannot overlap, whatever the ties and the rounding.
+triangulated, and triangles cannot overlap, regardless of ties and rounding.
 
 All lengths are compared with one tolerance, 1e-9 m. It is far above the rounding error of coordinates of 1e3 m
 (1e-13 m), so touching and coincident edges are recognised. It is far below any length that matters.
@@ -200,7 +200,7 @@ def _inside(sides: np.ndarray, e: int, polygon: int) -> tuple[float, float, int,
 
 @jit_inlined
 def _covered_parts(n_sides: int, e: int, work: Workspace) -> int:
-    """Write the parts of a side that other holes cover to ``work.covered``, sorted by their start; return their number."""
+    """Write the parts of a side that other holes cover to ``work.covered``, sorted by start; return their number."""
     covered, cutters = work.covered, work.cutters
     count = 0
     for hole in range(1, n_sides // 4):
@@ -308,7 +308,7 @@ def _next_on_piece(vertices: np.ndarray, n_vertices: int, a: int, b: int) -> int
 
 @jit
 def _put_edge(work: Workspace, a: int, b: int) -> None:
-    """Add an edge to the front. If the front holds the reversed edge, both enclose nothing, and that edge is removed."""
+    """Add an edge to the front, or remove the reversed edge if the front holds it, since both enclose nothing."""
     front, n = work.front, work.n_front
     for i in range(n):
         if front[i, 0] == b and front[i, 1] == a:

@@ -25,7 +25,7 @@ TYRES: dict[str, Callable[..., Any] | None] = {"linear": None}
 """Tyre forces by name; None for the linear tyre, which needs no function."""
 
 STANDARD = tuple(TYRES)
-"""Names of the package's own; those that others add come after them."""
+"""Names of the tyres that belong to the package; tyres added later follow them in :data:`TYRES`."""
 
 
 def add_tyre(name: str, force: Callable[..., Any]) -> None:

@@ -1,18 +1,18 @@
-"""Small dense strictly convex quadratic programs, by the dual active-set method of Goldfarb and Idnani.
+"""Solver for small, dense, strictly convex quadratic programs: the dual active-set method of Goldfarb and Idnani.
 
 ::
 
     min  x^T P x / 2 + q^T x      subject to   low <= A x <= high
     P x + q + A^T multipliers = 0,   a multiplier is >= 0 at the upper and <= 0 at the lower bound (OSQP's sign)
 
-The method (Goldfarb & Idnani, A numerically stable dual method for solving strictly convex quadratic
-programs, Mathematical Programming 27, 1983) starts at the unconstrained minimum and adds one violated row
-after the other, so that programs of which few rows bind take few iterations. It needs no feasible start.
+The method (Goldfarb & Idnani, A numerically stable dual method for solving strictly convex quadratic programs,
+Mathematical Programming 27, 1983) starts at the unconstrained minimum and adds one violated row after the other.
+Programs with few binding rows therefore take few iterations. The method needs no feasible starting point.
 
-Every active row is held as ``normal^T x <= c``: the row itself at its upper bound, its negative at the lower,
-with multipliers ``u >= 0``. A matrix T with ``T P T^T = I`` turns x into ``y``, ``x = T^T y``, in which the cost
-is round; T is rotated so that the active normals fill only the first of the new axes, ``T N = [R; 0]`` with
-R upper triangular. Then the first entries of y are fixed by the active rows and the others are free.
+Every active row is stored as ``normal^T x <= c`` with a multiplier ``u >= 0``: the row itself at its upper bound, the
+negative row at its lower bound. A matrix T with ``T P T^T = I`` transforms x to ``y``, ``x = T^T y``. In y the level
+sets of the cost are spheres. T is rotated so that the matrix N of the active normals occupies only the first of the new
+axes, ``T N = [R; 0]`` with R upper triangular. The active rows then fix the first entries of y; the others are free.
 """
 
 from __future__ import annotations
@@ -25,43 +25,46 @@ from shared_control_env.core.compile.jit import jit, jit_inlined
 from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, record_dtype
 
 SOLVED, ITERATION_LIMIT, FAILED = 0, 1, 2
-"""Outcomes; FAILED: infeasible, not strictly convex, too large, not finite, or too ill-conditioned to solve."""
+"""Statuses. FAILED: infeasible, not strictly convex, too large, not finite, or too ill-conditioned to solve."""
 
 MAX_VARIABLES = 2 * MAX_CONTROL + 1
-"""Most variables: the commands and one slack."""
+"""Largest number of variables: the commands and one slack."""
 
 MAX_ROWS = 2 * MAX_HORIZON + 1 + MAX_VARIABLES
-"""Most rows: both sides of the safe area at every stage, its end, and one bound a variable."""
+"""Largest number of rows: both sides of the safe area at every stage, its end, and one bound per variable."""
 
 UNBOUNDED = 1e20
-"""Bounds from here on, infinite ones included, stand for none, as in OSQP: no row's value gets there."""
+"""A bound of at least this size, an infinite one included, means no bound, as in OSQP: no row reaches this value."""
 
 FEASIBLE = 1e-10
-"""Violation that counts as none, relative to the row's absolute sum times max(1, |x|)."""
+"""Largest violation that counts as feasible, relative to the row's absolute sum times max(1, |x|) [-]."""
 
 ACCURATE = 1e-8
-"""Largest relative residual of a solution; a larger one is FAILED."""
+"""Largest relative residual of a solution [-]; with a larger one the status is FAILED."""
 
 _NEGLIGIBLE = 1e-11
-"""Relative size under which a direction is rounding: a normal depends on the active ones, a multiplier stays."""
+"""Relative size below which a value counts as rounding error [-].
+
+Such a normal depends linearly on the active normals. Such a rate leaves its multiplier unchanged.
+"""
 
 _SINGULAR = 1e-14
-"""Relative size of a Cholesky pivot under which P is not positive definite."""
+"""Relative size of a Cholesky pivot below which P counts as not positive definite [-]."""
 
 
 class Workspace:
-    """Scratch of one solver; one record a thread.
+    """Scratch memory of one solver; one record per thread.
 
     Attributes:
-        T: transform, T P T^T = I.
-        R: upper triangle: active normals; first P's factor.
-        y: the point, x = T^T y.
+        T: transformation with T P T^T = I.
+        R: upper triangular matrix of the active normals; at the beginning the Cholesky factor of P.
+        y: transformed point, x = T^T y.
         d: T times the normal of the row to add.
-        r: rate at which the active multipliers fall.
-        u: multipliers of the active rows, in the order of R's columns.
-        row: which rows those are.
-        side: of every row: 1 active at its upper bound, -1 at its lower, 0 not.
-        size: sum of the row's absolute entries.
+        r: rates at which the active multipliers decrease.
+        u: multipliers of the active rows, in the order of the columns of R.
+        row: indices of the active rows, in the same order.
+        side: state of every row: 1 active at its upper bound, -1 active at its lower bound, 0 not active.
+        size: sum of the absolute entries of every row.
         dual: residual P x + q + N u.
         gap: residual c - N^T x.
     """
@@ -97,20 +100,21 @@ def solve_qp(
 ) -> tuple[int, int, float, float]:
     """Minimise ``x^T P x / 2 + q^T x`` subject to ``low <= A x <= high``.
 
-    Meant for variables of order one: the tolerances are relative to max(1, |x|). It never raises.
+    The variables should be of order one, since the tolerances are relative to max(1, |x|). The function never raises
+    an exception.
 
     Args:
-        n, m: numbers of variables and rows, 1 <= n <= MAX_VARIABLES, 0 <= m <= MAX_ROWS; arrays may be longer.
-        P: symmetric, positive definite, shape (n, n).
-        q: shape (n,).
-        A: shape (m, n).
-        low, high: shape (m,); equal for an equation, beyond +-UNBOUNDED for none.
-        x: the minimiser is written here, shape (n,); not feasible where the status is not SOLVED.
-        multipliers: written, shape (m,).
+        n, m: numbers of variables and rows, 1 <= n <= MAX_VARIABLES, 0 <= m <= MAX_ROWS; the arrays may be longer.
+        P: quadratic cost, symmetric and positive definite, shape (n, n).
+        q: linear cost, shape (n,).
+        A: constraint matrix, shape (m, n).
+        low, high: bounds of the rows, shape (m,); equal for an equality, beyond +-UNBOUNDED for no bound.
+        x: minimiser, written, shape (n,); not feasible if the status is not SOLVED.
+        multipliers: multipliers of the rows, written, shape (m,).
         work: record of :data:`WORKSPACE`.
 
     Returns:
-        Status (SOLVED, ITERATION_LIMIT or FAILED), rows added and dropped, largest violation of a row, and
+        Status (SOLVED, ITERATION_LIMIT or FAILED), number of rows added and dropped, largest violation of a row, and
         largest entry of ``|P x + q + A^T multipliers|``; both residuals are infinite for invalid data.
     """
     if not (_begin(n, m, P, q, A, low, high, work) and _factorise(n, P, work)):
@@ -122,7 +126,7 @@ def solve_qp(
     _write_multipliers(m, active, low, high, multipliers, work)
     primal, relative_primal = _primal_residual(n, m, A, low, high, x, work)
     dual, relative_dual = _dual_residual(n, active, P, q, A, x, multipliers, work)
-    # Written so that a residual that is not a number fails too.
+    # The comparison is written so that a residual that is not a number also fails.
     if status == SOLVED and not (relative_primal <= ACCURATE and relative_dual <= ACCURATE):
         status = FAILED
     return status, iterations, primal, dual
@@ -139,7 +143,7 @@ def _begin(
     high: np.ndarray,
     work: Workspace,
 ) -> bool:
-    """Clear the active set and sum up every row; False if the data is too large, not finite or contradictory."""
+    """Clear the active set and compute the row sizes; False if the data are too large, not finite or contradictory."""
     if not (1 <= n <= MAX_VARIABLES and 0 <= m <= MAX_ROWS):
         return False
     for i in range(m):
@@ -161,7 +165,7 @@ def _begin(
 
 @jit
 def _factorise(n: int, P: np.ndarray, work: Workspace) -> bool:
-    """T = L^-1 of the Cholesky factor, P = L L^T; False if P is not positive definite."""
+    """Compute T = L^-1 from the Cholesky factor L, P = L L^T; False if P is not positive definite."""
     L, T = work.R, work.T
     for i in range(n):
         for j in range(i):
@@ -196,10 +200,10 @@ def _iterate(
     x: np.ndarray,
     work: Workspace,
 ) -> tuple[int, int, int]:
-    """The method proper: add violated rows, dropping active ones on the way, until none is violated.
+    """Main iteration: add violated rows, and drop active rows where needed, until no row is violated.
 
     Returns:
-        Status, rows added and dropped, and number of active rows.
+        Status, number of rows added and dropped, and number of active rows.
     """
     y, d, r, u = work.y, work.d, work.r, work.u
     for j in range(n):
@@ -218,13 +222,13 @@ def _iterate(
         free, total = _transform_normal(n, active, A[p], side, work)
         _solve_upper(active, work.R, d, r)
         to_drop, dropped = _until_multiplier_vanishes(active, low, high, work)
-        # Where the normal depends on the active ones, only the multipliers move.
+        # If the normal depends linearly on the active normals, only the multipliers change.
         independent = free > _NEGLIGIBLE * _NEGLIGIBLE * total
         violation = side * (_dot(n, A[p], x) - (high[p] if side > 0 else low[p]))
         to_add = violation / free if independent else np.inf
         step = min(to_add, to_drop)
         if step == np.inf:
-            return FAILED, iteration, active  # no point satisfies this row and the active ones
+            return FAILED, iteration, active  # no point satisfies both this row and the active rows
         if independent:
             for j in range(active, n):
                 y[j] -= step * d[j]
@@ -244,7 +248,7 @@ def _iterate(
 
 @jit
 def _dot(n: int, a: np.ndarray, b: np.ndarray) -> float:
-    """Scalar product of the first n entries."""
+    """Scalar product of the first n entries of two vectors."""
     value = 0.0
     for j in range(n):
         value += a[j] * b[j]
@@ -253,7 +257,7 @@ def _dot(n: int, a: np.ndarray, b: np.ndarray) -> float:
 
 @jit
 def _to_x(n: int, work: Workspace, x: np.ndarray) -> None:
-    """X = T^T y."""
+    """Transform the point y to x = T^T y."""
     T, y = work.T, work.y
     for c in range(n):
         x[c] = 0.0
@@ -264,7 +268,7 @@ def _to_x(n: int, work: Workspace, x: np.ndarray) -> None:
 
 @jit
 def _norm(n: int, x: np.ndarray) -> float:
-    """Largest absolute entry, and at least 1: what violations are relative to."""
+    """Reference size for violations: the largest absolute entry of x, and at least 1."""
     size = 1.0
     for j in range(n):
         size = max(size, abs(x[j]))
@@ -281,7 +285,7 @@ def _most_violated(
     x: np.ndarray,
     work: Workspace,
 ) -> tuple[int, int]:
-    """Row that x violates most relative to the row's size, and the bound it exceeds, 1 or -1; or -1, 0."""
+    """Row that x violates most, relative to the row's size, and the violated bound, 1 or -1; or -1, 0."""
     row, side, worst = -1, 0, FEASIBLE * _norm(n, x)
     for i in range(m):
         if work.side[i] != 0:
@@ -299,7 +303,7 @@ def _most_violated(
 
 @jit
 def _transform_normal(n: int, active: int, a: np.ndarray, side: int, work: Workspace) -> tuple[float, float]:
-    """D = T normal; returns the squares of its part outside the active normals, and of all of it."""
+    """Compute d = T normal; return the squared norms of its part outside the active normals and of the whole vector."""
     d = work.d
     fixed, free = 0.0, 0.0
     for j in range(n):
@@ -323,10 +327,10 @@ def _solve_upper(k: int, R: np.ndarray, rhs: np.ndarray, out: np.ndarray) -> Non
 
 @jit
 def _until_multiplier_vanishes(active: int, low: np.ndarray, high: np.ndarray, work: Workspace) -> tuple[float, int]:
-    """Longest step that keeps all multipliers >= 0, and the active row that ends it; or inf, -1.
+    """Longest step that keeps all multipliers >= 0, and the active row that limits the step; or inf, -1.
 
-    The multipliers of equations may have either sign. Those that fall by rounding alone are passed over, which
-    shows in the rates times the rows' sizes: they do not depend on the rows' units.
+    The multipliers of equalities may have either sign. Multipliers that decrease only by rounding are skipped. They are
+    recognised by the rate times the row's size, which does not depend on the row's unit.
     """
     u, r = work.u, work.r
     largest = 0.0
@@ -342,20 +346,20 @@ def _until_multiplier_vanishes(active: int, low: np.ndarray, high: np.ndarray, w
 
 @jit
 def _add(n: int, active: int, p: int, side: int, u_p: float, free: float, work: Workspace) -> None:
-    """Make row p the last active one: a Householder reflection turns the free part of d onto one axis."""
+    """Make row p the last active row; a Householder reflection turns the free part of d onto one axis."""
     T, R, y, d = work.T, work.R, work.y, work.d
     length = free**0.5
     pivot = d[active]
     R[active, active] = -length if pivot > 0.0 else length
     for j in range(active):
         R[j, active] = d[j]
-    # Reflection I - scale v v^T, v in place of the free part of d.
+    # The reflection is I - scale v v^T; v overwrites the free part of d.
     d[active] -= R[active, active]
     scale = 1.0 / (length * (length + abs(pivot)))
     along = 0.0
     for j in range(active, n):
         along += d[j] * y[j]
-    projected = work.r  # free from here on
+    projected = work.r  # the rates are not needed any more
     for c in range(n):
         projected[c] = 0.0
     for j in range(active, n):
@@ -372,7 +376,7 @@ def _add(n: int, active: int, p: int, side: int, u_p: float, free: float, work: 
 
 @jit
 def _drop(n: int, active: int, dropped: int, work: Workspace) -> None:
-    """Take a row out: Givens rotations make R triangular again."""
+    """Remove a row from the active set; Givens rotations make R triangular again."""
     T, R, y = work.T, work.R, work.y
     work.side[work.row[dropped]] = 0
     for k in range(dropped, active - 1):
@@ -408,10 +412,10 @@ def _refine(
     x: np.ndarray,
     work: Workspace,
 ) -> None:
-    """One step of iterative refinement of x and u on the active rows, from residuals of the program's own data.
+    """Refine x and u on the active rows by one step, with residuals of the original data of the program.
 
     ``P dx + N du = -dual`` and ``N^T dx = gap`` become ``R^T y = gap`` on the fixed axes and ``y = -T dual`` on the
-    free ones, then ``R du = -y - T dual`` and ``dx = T^T y``.
+    free axes; then ``R du = -y - T dual`` and ``dx = T^T y``.
     """
     T, R, y, u, dual, gap = work.T, work.R, work.y, work.u, work.dual, work.gap
     for i in range(n):
@@ -443,7 +447,10 @@ def _refine(
 def _write_multipliers(
     m: int, active: int, low: np.ndarray, high: np.ndarray, multipliers: np.ndarray, work: Workspace
 ) -> None:
-    """Multipliers of all rows; one that rounding took below zero is zero, and counts in the dual residual."""
+    """Write the multipliers of all rows.
+
+    A multiplier that rounding made negative is set to zero; the dual residual contains the resulting error.
+    """
     for i in range(m):
         multipliers[i] = 0.0
     for k in range(active):
@@ -462,7 +469,7 @@ def _primal_residual(
     x: np.ndarray,
     work: Workspace,
 ) -> tuple[float, float]:
-    """Largest violation of a row, and the largest relative to the row's size and max(1, |x|)."""
+    """Largest violation of a row, and largest violation relative to the row's size and max(1, |x|)."""
     largest, relative = 0.0, 0.0
     for i in range(m):
         value = _dot(n, A[i], x)
@@ -484,7 +491,7 @@ def _dual_residual(
     multipliers: np.ndarray,
     work: Workspace,
 ) -> tuple[float, float]:
-    """Largest entry of ``|P x + q + A^T multipliers|``, and relative to the largest sum of its absolute terms."""
+    """Largest entry of ``|P x + q + A^T multipliers|``, absolute and relative to the largest sum of absolute terms."""
     largest, scale = 0.0, 0.0
     for i in range(n):
         residual, size = q[i], abs(q[i])

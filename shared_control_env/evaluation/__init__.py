@@ -1,4 +1,4 @@
-"""The benchmark: drivers and authorities on suites of degraded automation, measured and reported."""
+"""The benchmark: runs drivers and authorities on suites of degraded automation, and reports the metrics."""
 
 from shared_control_env.evaluation.catalogue import (
     AUTHORITIES,

@@ -1,4 +1,4 @@
-"""What a program has added to the package's tables: other processes need it too, and results depend on it."""
+"""Entries that a program adds to the tables of the package. Other processes need them, and results depend on them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TABLES: dict[str, dict[str, Any]] = {
     "scenarios": scenarios.SCENARIOS,
     "metrics": metrics.METRICS,
 }
-"""The tables that programs add to, by what they hold."""
+"""The tables that a program can add entries to, by name."""
 
 OWN = {
     "kinds": kinds.STANDARD,
@@ -32,11 +32,11 @@ OWN = {
     "scenarios": scenarios.STANDARD,
     "metrics": metrics.STANDARD,
 }
-"""Names of the package's own entries."""
+"""Names of the entries that the package defines, by table."""
 
 
 def additions() -> dict[str, dict[str, Any]]:
-    """Entries that are not the package's, by table and name; tables without any are left out."""
+    """Entries that the program has added, by table and name. Tables without additions are left out."""
     found = {
         name: {key: entry for key, entry in table.items() if key not in OWN[name]} for name, table in TABLES.items()
     }
@@ -44,10 +44,10 @@ def additions() -> dict[str, dict[str, Any]]:
 
 
 def adopt(added: Mapping[str, Mapping[str, Any]]) -> None:
-    """Add what another process had added, unless the modules that were imported with it have done so.
+    """Add the additions of another process. Entries that imported modules have already added are kept.
 
     Args:
-        added: of :func:`additions`.
+        added: result of :func:`additions` in the other process.
     """
     for name, entries in added.items():
         for key, entry in entries.items():
@@ -60,9 +60,12 @@ def adopt(added: Mapping[str, Mapping[str, Any]]) -> None:
 
 
 def described(added: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str]]:
-    """Digest of every added entry, which tells it from another of the same name.
+    """Digest of every added entry, which distinguishes it from other entries of the same name.
 
     Args:
-        added: of :func:`additions`.
+        added: result of :func:`additions`.
+
+    Returns:
+        Digests by table and name.
     """
     return {name: {key: digest_of(entry) for key, entry in entries.items()} for name, entries in added.items()}

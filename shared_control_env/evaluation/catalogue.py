@@ -1,4 +1,4 @@
-"""What the benchmark knows by name: drivers, authorities and suites. All of them can be given by users too."""
+"""The catalogue of drivers, authorities and suites that the benchmark knows by name. Users can also pass their own."""
 
 from __future__ import annotations
 
@@ -40,11 +40,13 @@ class DriverEntry(NamedTuple):
     """A driver of the benchmark.
 
     Attributes:
-        description: in a line.
-        make: makes one for each environment; None for the paper's predictive driver, which the kernel runs.
+        description: description in one line.
+        make: makes a driver for each environment; None for the paper's predictive driver, which the kernel runs.
         config: changes to the environment's settings that belong to the driver, such as the lag.
-        fingerprint: tells this driver from others of the same name; None to have it made of its code and arguments.
-        draws: settings of the driver that are drawn for every episode, beside those that the scenario draws.
+        fingerprint: text that distinguishes this driver from others of the same name; None to compute a digest from
+            its code and arguments.
+        draws: settings of the driver that are drawn for every episode, in addition to those that the scenario draws;
+            entries of ``config["randomise"]``.
     """
 
     description: str
@@ -55,13 +57,14 @@ class DriverEntry(NamedTuple):
 
 
 class AuthorityEntry(NamedTuple):
-    """An authority of the benchmark: what decides alpha_a, and the law that applies it.
+    """An authority of the benchmark: the allocator that decides alpha_a, and the law that applies alpha_a.
 
     Attributes:
-        description: in a line.
-        law: one of :data:`core.authority.LAWS`.
-        make: makes one for each environment; None for the paper's fuzzy inference, which the kernel runs.
-        fingerprint: tells this authority from others of the same name; None to have it made of its code and arguments.
+        description: description in one line.
+        law: name of the law, one of :data:`core.authority.laws.LAWS`.
+        make: makes an allocator for each environment; None for the paper's fuzzy inference, which the kernel runs.
+        fingerprint: text that distinguishes this authority from others of the same name; None to compute a digest from
+            its code and arguments.
     """
 
     description: str
@@ -71,12 +74,12 @@ class AuthorityEntry(NamedTuple):
 
 
 class Suite(NamedTuple):
-    """Scenarios and degradations that are crossed.
+    """Scenarios and degradations. The benchmark runs every combination of the two.
 
     Attributes:
-        description: in a line.
+        description: description in one line.
         scenarios: keys of :data:`envs.scenarios.SCENARIOS`.
-        degradations: keys of :data:`envs.degradations.DEGRADATIONS`; None for the one that the scenario has.
+        degradations: keys of :data:`envs.degradations.DEGRADATIONS`; None for the degradation of the scenario itself.
     """
 
     description: str
@@ -89,7 +92,7 @@ def _lag(name: str) -> dict[str, Any]:
 
 
 def _person(name: str, description: str) -> DriverEntry:
-    """A person of :data:`core.parameters.PERSONS`, whose arm is drawn around the five that the paper identified."""
+    """Entry for a person of :data:`core.parameters.PERSONS`. The arm is drawn around the five of the paper."""
     person, default = PERSONS[name]._asdict(), PersonParameters()._asdict()
     differing = {field: value for field, value in person.items() if value != default[field]}
     draws = tuple(
@@ -150,15 +153,16 @@ SUITES: dict[str, Suite] = {
 
 
 def choose(what: str, given: str | Iterable[str] | Mapping[str, Any], known: Mapping[str, T]) -> dict[str, Any]:
-    """Entries by name: of those known, or a user's own as they are given.
+    """Choose entries by name: entries of the catalogue, or a user's own entries as given.
 
     Args:
-        what: word for messages, such as ``driver``.
-        given: a name, several, ``all``, or a mapping of names to entries.
+        what: word for error messages, such as ``driver``.
+        given: a name, several names, ``all``, or a mapping of names to entries.
         known: the catalogue.
 
     Raises:
-        ValueError: for an unknown name, listing the valid ones and the nearest; for none at all, or what is no name.
+        ValueError: for an unknown name, with the nearest and all valid names; for no name; or for a value that is no
+            name.
     """
     if isinstance(given, str) and given == "all":
         return dict(known)
@@ -169,7 +173,7 @@ def choose(what: str, given: str | Iterable[str] | Mapping[str, Any], known: Map
         raise ValueError(f"{what} = {given!r} names nothing; valid are {', '.join(known)}")
     for name in names:
         if not isinstance(name, str) or not name or not _is_text(name):
-            raise ValueError(f"{what} = {name!r} must be a name, which is a text that is not empty")
+            raise ValueError(f"{what} = {name!r} must be a name, a text that is not empty")
         if not isinstance(given, Mapping) and name not in known:
             near = nearest(name, known)
             suggestion = f"did you mean {near!r}? " if near else ""
@@ -178,10 +182,15 @@ def choose(what: str, given: str | Iterable[str] | Mapping[str, Any], known: Map
 
 
 def choose_one(what: str, name: Any, known: Mapping[str, T]) -> T:
-    """The entry of one name.
+    """The entry for one name.
+
+    Args:
+        what: word for error messages, such as ``driver``.
+        name: the name.
+        known: entries by name.
 
     Raises:
-        ValueError: if it is not known, with the nearest.
+        ValueError: for an unknown name, with the nearest valid name.
     """
     if not isinstance(name, str) or name == "all":
         raise ValueError(f"{what} = {name!r} must be one name; valid are {', '.join(known)}")
@@ -189,10 +198,16 @@ def choose_one(what: str, name: Any, known: Mapping[str, T]) -> T:
 
 
 def chosen_drivers(given: Drivers) -> dict[str, DriverEntry]:
-    """Drivers by name, each made once to see that it is one.
+    """Choose drivers by name. Each driver is made once to check that it implements the interface.
+
+    Args:
+        given: a name, several names, ``all``, or a mapping of names to entries or to makers of drivers.
+
+    Returns:
+        Driver entries by name.
 
     Raises:
-        ValueError: as :func:`choose`; or for what makes no driver.
+        ValueError: as for :func:`choose`; or if an entry does not make a driver.
     """
     entries = {}
     for name, entry in choose("driver", given, DRIVERS).items():
@@ -212,10 +227,16 @@ def chosen_drivers(given: Drivers) -> dict[str, DriverEntry]:
 
 
 def chosen_authorities(given: Authorities) -> dict[str, AuthorityEntry]:
-    """Authorities by name, each allocator made once to see that it is one.
+    """Choose authorities by name. Each allocator is made once to check that it implements the interface.
+
+    Args:
+        given: a name, several names, ``all``, or a mapping of names to entries or to makers of allocators.
+
+    Returns:
+        Authority entries by name.
 
     Raises:
-        ValueError: as :func:`choose`; or for what makes no allocator, or an unknown law.
+        ValueError: as for :func:`choose`; if an entry does not make an allocator; or for an unknown law.
     """
     entries = {}
     for name, entry in choose("authority", given, AUTHORITIES).items():
@@ -230,7 +251,7 @@ def chosen_authorities(given: Authorities) -> dict[str, AuthorityEntry]:
 
 
 def _is_text(name: str) -> bool:
-    """Whether a name can be written: no half of a character."""
+    """Whether a name can be encoded; unpaired surrogates cannot."""
     try:
         name.encode()
     except UnicodeEncodeError:
@@ -239,14 +260,14 @@ def _is_text(name: str) -> bool:
 
 
 def _given(what: str, name: str, make: Any) -> Any:
-    """What a user gives for a name by itself, which is something."""
+    """The maker that a user gives for a name; raises ValueError for None."""
     if make is None:
-        raise ValueError(f"{what} {name!r} is None; it must be what makes one for each episode, such as its class")
+        raise ValueError(f"{what} {name!r} is None; it must make a {what} for each episode, such as its class")
     return make
 
 
 def _check_maker(what: str, name: str, make: Any, kind: Any, methods: str) -> None:
-    """Raise ValueError unless calling ``make`` gives an object of a kind."""
+    """Raise ValueError unless calling ``make`` returns an object with the interface ``kind``."""
     if make is None:
         return
     if not callable(make):
@@ -266,10 +287,13 @@ def _check_maker(what: str, name: str, make: Any, kind: Any, methods: str) -> No
 
 
 def checked_automation(make: Any) -> None:
-    """Raise ValueError unless this makes an automation, or is None.
+    """Check that a user's argument makes an automation, or is None.
 
     Args:
-        make: what a user gives, such as a class.
+        make: maker of an automation, such as a class; or None.
+
+    Raises:
+        ValueError: if ``make`` does not make an automation.
     """
     if make is None:
         return
@@ -278,15 +302,18 @@ def checked_automation(make: Any) -> None:
         if not isinstance(made, type) and isinstance(made, Planner):
             return
     raise ValueError(
-        f"automation = {make!r} must be what makes one for each episode, such as a class with reset() and act(scene)"
+        f"automation = {make!r} must make an automation for each episode, such as a class with reset() and act(scene)"
     )
 
 
 def chosen_suite(suite: str | Suite) -> Suite:
-    """A suite by name, or a user's own, its names checked.
+    """Choose a suite by name, or check a user's own suite.
+
+    Args:
+        suite: name of a suite, or a suite.
 
     Raises:
-        ValueError: for an unknown suite, scenario or degradation, with the nearest, or an empty suite.
+        ValueError: for an unknown suite, scenario or degradation, with the nearest valid name; or for an empty suite.
     """
     if not isinstance(suite, Suite):
         return choose_one("suite", suite, SUITES)

@@ -1,4 +1,4 @@
-"""Ways to run batches: one after the other, in processes, or on a Ray cluster. All give the same rows."""
+"""Engines that run batches: one after the other, in processes, or on a Ray cluster. All return the same rows."""
 
 from __future__ import annotations
 
@@ -17,27 +17,41 @@ from shared_control_env.evaluation.episodes import Batch, run
 Rows = list[dict[str, Any]]
 
 ATTEMPTS = 3
-"""Times that Ray starts a batch again whose worker was lost."""
+"""Number of times that Ray restarts a batch after the loss of its worker."""
 
 
 class WorkersLostError(RuntimeError):
-    """Processes were killed, or could not begin."""
+    """Worker processes were killed or could not start."""
 
 
 def serial(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Rows]]:
-    """One batch after the other, here."""
+    """Run one batch after the other in this process.
+
+    Args:
+        batches: batches to run.
+
+    Returns:
+        Each batch with its rows, as an iterator.
+    """
     for batch in batches:
         yield batch, run(batch)
 
 
 def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows]]:
-    """Batches in some processes, as they are done; the processes end with this one, even if it is killed.
+    """Run batches in several processes, and return them in the order of completion.
 
-    The first batch of either kind, with the driver in the kernel and without, runs here, so that what it compiles is
-    in the cache before the processes look for it.
+    The worker processes end with this process, even if it is killed. The first batch with the driver in the kernel and
+    the first without run in this process. The compiled functions are then in the cache before the workers need them.
+
+    Args:
+        batches: batches to run.
+        jobs: number of worker processes.
+
+    Returns:
+        Each batch with its rows, as an iterator.
 
     Raises:
-        WorkersLostError: if a process was killed, or could not begin.
+        WorkersLostError: if a process was killed or could not start, or if a batch cannot be sent to a process.
     """
     for table, entries in additions().items():
         try:
@@ -76,10 +90,10 @@ def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows
 
 
 def worker_pool(jobs: int) -> ProcessPoolExecutor:
-    """Processes that end with the one that starts them, however that ends, and know what this one has added.
+    """A pool of processes that end with this process, however it ends, and that have its additions to the tables.
 
     Args:
-        jobs: how many.
+        jobs: number of processes.
     """
     return ProcessPoolExecutor(
         jobs, mp_context=get_context("spawn"), initializer=_begin_worker, initargs=(additions(),)
@@ -87,19 +101,19 @@ def worker_pool(jobs: int) -> ProcessPoolExecutor:
 
 
 def _begin_worker(added: Mapping[str, Mapping[str, Any]]) -> None:
-    """Take over what the parent has added, and end with it."""
+    """Adopt the additions of the parent process, and end when the parent ends."""
     adopt(added)
     _end_with_parent()
 
 
 def _run_elsewhere(added: Mapping[str, Mapping[str, Any]], batch: Batch) -> Rows:
-    """:func:`episodes.run` in a process that may not know what was added."""
+    """Call :func:`episodes.run` in a process that may lack the additions."""
     adopt(added)
     return run(batch)
 
 
 def _end_with_parent() -> None:
-    """Watch the parent in a thread: one that is killed tells nobody, and its workers would wait for it for ever."""
+    """End this process when its parent ends: the workers of a parent that is killed would wait forever."""
     parent = parent_process()
 
     def watch() -> None:
@@ -111,15 +125,20 @@ def _end_with_parent() -> None:
 
 
 def ray_cluster(batches: Sequence[Batch], jobs: int, address: str | None = None) -> Iterator[tuple[Batch, Rows]]:
-    """Batches as tasks of a Ray cluster, as they are done; one whose worker is lost is started again.
+    """Run batches as tasks on a Ray cluster, and return them in the order of completion.
+
+    A batch whose worker is lost is started again.
 
     Args:
-        batches: to run.
-        jobs: cores of a cluster that is started here, where there is none.
-        address: of a running cluster; ``auto`` finds one on this machine.
+        batches: batches to run.
+        jobs: number of cores of the cluster that is started if none is running.
+        address: address of a running cluster; ``auto`` finds one on this machine.
+
+    Returns:
+        Each batch with its rows, as an iterator.
 
     Raises:
-        ImportError: without Ray.
+        ImportError: if Ray is not installed.
     """
     try:
         import ray

@@ -1,4 +1,4 @@
-"""Episodes of the benchmark: which there are, and their run in one vectorised environment a batch."""
+"""Episodes of the benchmark: the plan of all episodes, and their run in one vectorised environment per batch."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from shared_control_env.evaluation.metrics import Trajectory, measure_all
 from shared_control_env.vector.environment import SharedControlVectorEnv
 
 LARGEST_BATCH = 170
-"""Episodes that run together at most: large enough for the kernel, small enough to lose little when stopped."""
+"""Largest number of episodes per batch: large enough for the kernel, small enough to lose little if interrupted."""
 
 MOST_SEEDS = 1_000_000
 """Largest number of seeds of a run."""
 
 NOT_IN_THE_NUMBERS = ("report.py", "replay.py", "statistics.py", "storage.py", "fingerprint.py", "graphics.py")
-"""Sources that no result depends on."""
+"""Source files that no result depends on."""
 
 AS_GIVEN = "own"
-"""Name of the degradation that a scenario has by itself."""
+"""Name in the table for the degradation that the scenario itself has."""
 
 
 class Batch(NamedTuple):
-    """Episodes that differ in degradation and seed alone.
+    """Episodes that differ only in degradation and seed.
 
     Attributes:
         scenario: key of :data:`envs.scenarios.SCENARIOS`.
-        driver: name, and entry.
-        authority: name, and entry.
-        episodes: degradation (None for the scenario's own) and seed of each.
+        driver: name and entry of the driver.
+        authority: name and entry of the authority.
+        episodes: degradation (None for the scenario's own) and seed of each episode.
         config: changes to the scenario's settings.
-        automation: makes another automation for each environment; None for the predictive controller.
+        automation: makes a user-defined automation for each environment; None for the predictive controller.
     """
 
     scenario: str
@@ -61,7 +61,7 @@ class Batch(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Text that says which episodes these are, beside driver and authority."""
+        """Text that identifies the episodes, apart from driver and authority."""
         return json.dumps([self.scenario, self.episodes])
 
 
@@ -73,15 +73,15 @@ def plan(
     config: Mapping[str, Any],
     automation: Callable[[], Planner] | None = None,
 ) -> Iterator[Batch]:
-    """All episodes of a suite in batches, in a fixed order.
+    """Divide all episodes of a suite into batches, in a fixed order.
 
     Args:
         suite: scenarios and degradations.
-        drivers: by name.
-        authorities: by name.
-        seeds: of the episodes of each scenario and degradation.
+        drivers: driver entries by name.
+        authorities: authority entries by name.
+        seeds: seeds of the episodes of each scenario and degradation.
         config: changes to the settings of all scenarios.
-        automation: makes another automation; None for the predictive controller.
+        automation: makes a user-defined automation; None for the predictive controller.
     """
     episodes = [(degradation, seed) for degradation in suite.degradations for seed in seeds]
     for scenario in suite.scenarios:
@@ -95,8 +95,12 @@ def plan(
 def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
     """Changes to the scenario's settings for one episode of a batch.
 
+    Args:
+        batch: the batch.
+        degradation: degradation of the episode; None for the scenario's own.
+
     Raises:
-        ValueError: if two of authority, suite, driver and the user's config say different things of one setting.
+        ValueError: if two of authority, suite, driver and the user's config disagree on one setting.
     """
     driver, entry = f"the driver {batch.driver[0]!r}", batch.driver[1]
     parts: list[tuple[str, Mapping[str, Any]]] = [
@@ -126,11 +130,11 @@ def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
 
 
 DRAWN = "a draw"
-"""Stands for the value of a setting that is drawn."""
+"""Placeholder for the value of a setting that is drawn."""
 
 
 def _leaves(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Paths of the settings that nested changes name, such as ``driver_lag.K_h``, and their values."""
+    """Paths of the settings in nested changes, such as ``driver_lag.K_h``, and their values."""
     for key, value in changes.items():
         if isinstance(value, Mapping):
             yield from _leaves(value, f"{prefix}{key}.")
@@ -139,17 +143,17 @@ def _leaves(changes: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 
 
 def _refuse_clash(owners: Mapping[str, tuple[str, Any]], who: str, path: str, value: Any) -> None:
-    """Raise ValueError where a setting is another's, and has another value there."""
+    """Raise ValueError if another owner gives a setting another value, or if a draw is involved."""
     owner, present = owners.get(path, (who, value))
     if owner != who and (present != value or value == DRAWN):
         what = "draws" if present == DRAWN else f"sets to {present!r}"
         raise ValueError(
-            f"{who} changes {path!r}, which {owner} {what}; leave it out, or give an entry of your own for it"
+            f"{who} changes {path!r}, which {owner} {what}; remove the change, or define an entry of your own"
         )
 
 
 def _joined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
-    """Two nested dicts of changes as one; the second counts where both say something."""
+    """Merge two nested dicts of changes. The second has priority."""
     joined = dict(first)
     for key, value in second.items():
         both = isinstance(value, Mapping) and isinstance(joined.get(key), Mapping)
@@ -159,7 +163,7 @@ def _joined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, An
 
 @cache
 def source_digest() -> str:
-    """Digest of the sources that the numbers come from, so that those of a changed checkout are told apart."""
+    """Digest of the source files that results depend on, which distinguishes results of a changed checkout."""
     digest = sha256()
     for folder in ("core", "controllers", "envs", "vector", "learned", "evaluation"):
         for path in sorted((Path(shared_control_env.__file__).parent / folder).rglob("*.py")):
@@ -169,22 +173,22 @@ def source_digest() -> str:
 
 
 def versions() -> str:
-    """Versions that enter the results."""
+    """Versions of Python, the packages and the sources that the results depend on."""
     packages = ("shared_control_env", "gymnasium", "highway-env", "numpy", "numba", "osqp")
     parts = [f"{name} {version(name)}" for name in packages]
     return ", ".join(["python " + python_version(), *parts, f"sources {source_digest()}"])
 
 
 def make_environment(batch: Batch, render_mode: str | None = None) -> Any:
-    """Environment of a batch's episodes, with the slots bound that need no Python.
+    """Environment for the episodes of a batch. Slots are bound if their driver or allocator runs in the kernel.
 
     Args:
-        batch: the episodes.
+        batch: the batch.
         render_mode: ``rgb_array`` or None.
     """
     limiter, driver = batch.authority[1].make is None, batch.driver[1].make is None
     if batch.automation is not None:
-        from shared_control_env.evaluation.one_by_one import SingleEnvironments  # which needs highway-env
+        from shared_control_env.evaluation.one_by_one import SingleEnvironments  # needs highway-env
 
         automations = [batch.automation() for _ in batch.episodes]
         return SingleEnvironments(
@@ -202,11 +206,17 @@ def make_environment(batch: Batch, render_mode: str | None = None) -> Any:
 
 
 class Recorder:
-    """Signals of all time steps of a batch.
+    """Records the signals of all time steps of a batch.
 
     Args:
-        steps: T.
-        n: episodes.
+        steps: largest number of time steps T.
+        n: number of episodes.
+
+    Attributes:
+        lengths: number of time steps of each episode, shape (n,).
+        crashed, left_road: whether each episode ended in a collision, or off the road, shape (n,).
+        failures: number of solver failures of each episode, shape (n,).
+        noticed: time at which a person at rest noticed something [s], nan if never, shape (n,).
     """
 
     SIGNALS = ("z", "y_target", "v_target", "u", "u_h_act", "u_a_act", "alpha_a", "neighbours", "fault_active")
@@ -220,7 +230,16 @@ class Recorder:
         self._running = np.ones(n, dtype=bool)
 
     def note(self, k: int, infos: Mapping[str, Any], ended: np.ndarray) -> bool:
-        """Keep the signals of step k, and how episodes end with it; whether any goes on."""
+        """Record the signals of one step, and the ends of episodes.
+
+        Args:
+            k: index of the time step.
+            infos: infos of all environments.
+            ended: whether the episode of each environment has ended, shape (n,).
+
+        Returns:
+            Whether any episode is still running.
+        """
         for name in self.SIGNALS:
             value = np.asarray(infos[name])
             if name not in self._values:
@@ -239,7 +258,13 @@ class Recorder:
         return bool(self._running.any())
 
     def trajectory(self, i: int, settings: Any, wall_time: float) -> Trajectory:
-        """Episode i."""
+        """The trajectory of one episode.
+
+        Args:
+            i: index of the episode.
+            settings: settings of the episode.
+            wall_time: computing time of the episode [s].
+        """
         value = {name: array[: self.lengths[i], i] for name, array in self._values.items()}
         limits = np.array([settings.limits.a_max, settings.limits.delta_max])
         ahead = value["neighbours"][:, PRECEDING]
@@ -269,11 +294,11 @@ class Recorder:
 
 
 class Policies:
-    """Drivers and allocators of a batch that Python runs, one of each an environment.
+    """Drivers and allocators of a batch that run in Python, one instance per environment.
 
     Args:
-        batch: the episodes.
-        env: their environment, reset.
+        batch: the batch.
+        env: environment of the batch, after its reset.
     """
 
     def __init__(self, batch: Batch, env: Any) -> None:
@@ -291,7 +316,14 @@ class Policies:
                 policy.reset(seed=seed)
 
     def decide(self, observations: np.ndarray) -> Any:
-        """Action of all environments: of the slots that the kernel leaves open."""
+        """Actions of all environments for the open slots.
+
+        Args:
+            observations: observations of all environments, shape (N, n).
+
+        Returns:
+            Values of the open slot, or a dict of both slots; an empty dict if both are bound.
+        """
         action = {}
         if self._drivers:
             commands = [
@@ -312,12 +344,12 @@ def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, 
     """Run a batch.
 
     Args:
-        batch: the episodes.
-        frames: pictures of the first episode before every step are appended, where a list is given.
+        batch: the batch.
+        frames: list to which pictures of the first episode before each step are appended; None for no pictures.
 
     Returns:
-        One row an episode: what it is, how it ended, the driver's K_h and T_h [s], when a person at rest noticed
-        something [s], every metric, and what it was made with.
+        One row per episode: identity, end, the driver's K_h [-] and T_h [s], the time at which a person at rest noticed
+        something [s], all metrics, and the versions.
     """
     begin = perf_counter()
     env = make_environment(batch, None if frames is None else "rgb_array")
@@ -358,5 +390,10 @@ def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, 
 
 
 def config_hash(scenario: str, changes: Mapping[str, Any]) -> str:
-    """Digest of all that a scenario's settings and the changes to them say."""
+    """Digest of the settings of a scenario and of the changes to them.
+
+    Args:
+        scenario: key of :data:`envs.scenarios.SCENARIOS`.
+        changes: changes to the settings of the scenario.
+    """
     return sha256(json.dumps([SCENARIOS[scenario].settings, changes], sort_keys=True).encode()).hexdigest()[:12]

@@ -1,4 +1,4 @@
-"""What a driver or an allocator of a user's is, as a digest: results of another one of the same name are not mixed."""
+"""Digests of user-defined drivers and allocators, so that results of different ones with one name are not mixed."""
 
 from __future__ import annotations
 
@@ -19,42 +19,42 @@ from shared_control_env.controllers.arrays import as_array
 
 _INSTALLED = [
     *(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib", "purelib", "platlib")),
-    Path(shared_control_env.__file__).resolve().parent,  # whose sources are told by its version
+    Path(shared_control_env.__file__).resolve().parent,  # the versions already contain a digest of its sources
 ]
-"""Folders of code that does not change between runs, or is told otherwise."""
+"""Folders of code that does not change between runs, or whose changes are recorded elsewhere."""
 
 _NOT_CODE = ("__dict__", "__weakref__", "__doc__", "__module__", "__firstlineno__", "__static_attributes__")
 
 
 def fingerprint(make: Callable[..., Any]) -> str:
-    """Digest of what makes a driver or an allocator.
+    """Digest of the maker of a driver or an allocator.
 
-    It is made of the code of its class, of all that this uses of the user's own modules, and of its arguments. Comments
-    and layout do not count; what is read from files at run time is not seen.
+    The digest covers the code of the class, everything that the code uses from the user's own modules, and the
+    arguments. Comments and layout do not affect the digest. Data that is read from files at run time is not covered.
 
     Args:
         make: a class, a function, or a :class:`functools.partial` of one.
 
     Raises:
-        ValueError: if it holds something whose content cannot be told.
+        ValueError: if the maker holds an object whose content cannot be read.
     """
     return digest_of(make)
 
 
 def digest_of(value: Any) -> str:
-    """Digest of a value: of the code of functions and classes, and of the content of all else.
+    """Digest of a value: of the code of functions and classes, and of the content of all other objects.
 
     Args:
-        value: what is to be told from others.
+        value: the value.
 
     Raises:
-        ValueError: as :func:`fingerprint`.
+        ValueError: as for :func:`fingerprint`.
     """
     return sha256("\n".join(_parts(value, {})).encode()).hexdigest()[:16]
 
 
 def _is_own(module: str) -> bool:
-    """Whether a module is the user's, whose code is looked into; of one that is installed the name is enough."""
+    """Whether a module is the user's own. Its code enters the digest; for an installed module the name is enough."""
     if module == "builtins":
         return False
     file = getattr(sys.modules.get(module), "__file__", None)
@@ -62,7 +62,7 @@ def _is_own(module: str) -> bool:
 
 
 def _parts(value: Any, seen: dict[int, Any]) -> Iterator[str]:
-    """Texts that say what a value is; what was seen is kept, since the place of what is gone serves others."""
+    """Texts that describe a value. ``seen`` keeps the objects alive, because the id of a deleted object is reused."""
     if isinstance(value, bool | int | float | complex | str | bytes | None | type(Ellipsis)):
         yield repr(value)
         return
@@ -142,7 +142,7 @@ def _of_function(function: FunctionType, seen: dict[int, Any]) -> Iterator[str]:
 
 
 def _names(code: CodeType) -> list[str]:
-    """Names that code looks up, that of inner functions and comprehensions too."""
+    """Names that code looks up, those in inner functions and comprehensions included."""
     inner = [name for constant in code.co_consts if isinstance(constant, CodeType) for name in _names(constant)]
     return [*code.co_names, *inner]
 
@@ -150,7 +150,7 @@ def _names(code: CodeType) -> list[str]:
 def _of_code(code: CodeType) -> Iterator[str]:
     yield f"{code.co_code.hex()} {code.co_names} {code.co_varnames}"
     constants = code.co_consts[1:] if code.co_consts and isinstance(code.co_consts[0], str) else code.co_consts
-    for constant in constants:  # without the docstring
+    for constant in constants:  # the docstring is left out
         if isinstance(constant, CodeType):
             yield from _of_code(constant)
         else:
@@ -164,7 +164,7 @@ def _digest(content: bytes) -> str:
 def _pickled(value: Any) -> str:
     try:
         return _digest(pickle.dumps(value, protocol=5))
-    except Exception as error:  # whatever an object's own pickling raises
+    except Exception as error:  # pickling code of a user's object may raise anything
         raise ValueError(
-            f"it cannot be told what {value!r} is ({error}); give a fingerprint: DriverEntry(..., fingerprint='...')"
+            f"cannot read the content of {value!r} ({error}); give a fingerprint: DriverEntry(..., fingerprint='...')"
         ) from None

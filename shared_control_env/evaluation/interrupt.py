@@ -1,4 +1,4 @@
-"""What a command that can be stopped says when it is."""
+"""The message of a command that was interrupted and can be resumed."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import typer
 
 @contextmanager
 def resumable(folder: Path) -> Iterator[None]:
-    """End the command when it is interrupted, saying where the part that is done can be found.
+    """End a command if it is interrupted, with a message that states where the finished part is stored.
 
     Args:
-        folder: of the results.
+        folder: folder of the results.
 
     Raises:
-        typer.Exit: when interrupted, with the status 130 that shells give it.
+        typer.Exit: if interrupted, with exit status 130 as in shells.
     """
     try:
         yield

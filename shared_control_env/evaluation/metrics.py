@@ -1,4 +1,4 @@
-"""What is measured of an episode: every metric with its unit, direction and definition."""
+"""The metrics of an episode, each with its unit, direction and definition."""
 
 from __future__ import annotations
 
@@ -14,41 +14,43 @@ LATERAL_ACCELERATION_LIMIT = 3.0
 """Largest lateral acceleration of a lane keeping system [m/s^2]; ISO 11270."""
 
 LATERAL_JERK_LIMIT = 5.0
-"""Largest lateral jerk, averaged over half a second [m/s^3]; ISO 11270."""
+"""Largest lateral jerk of a lane keeping system, averaged over half a second [m/s^3]; ISO 11270."""
 
 JERK_WINDOW = 0.5
-"""Over which jerk is averaged [s]; ISO 11270."""
+"""Time over which jerk is averaged [s]; ISO 11270."""
 
 REVERSAL_GAP = np.radians(0.2)
 """Smallest change of the front steering angle that counts as a reversal [rad]: 3 degrees at the wheel, ratio 16."""
 
 DETECTION_LEVEL = 0.8
-"""Authority under which a degradation counts as detected [-]."""
+"""Authority alpha_a below which a degradation counts as detected [-]."""
 
 RECOVERED = 0.5
-"""Lateral error within which the car has recovered [m]."""
+"""Lateral error within which the car counts as recovered [m]."""
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Signals of one episode at its T time steps, and how it ended.
+    """Signals of one episode at its T time steps, and its end.
 
     Attributes:
         dt: time step [s].
         lateral_error: y - y_target, shape (T,) [m].
-        lane_width: [m].
-        speed, target_speed: shape (T,) [m/s].
-        yaw_rate: shape (T,) [rad/s].
-        command: u of the vehicle, ``[a, delta]`` over its limits, shape (T, 2) [-].
-        delta_max: limit of the steering [rad].
+        lane_width: width of a lane [m].
+        speed: longitudinal speed v_x, shape (T,) [m/s].
+        target_speed: target speed, shape (T,) [m/s].
+        yaw_rate: yaw rate r, shape (T,) [rad/s].
+        command: command u of the vehicle, ``[a, delta]`` as shares of the limits, shape (T, 2) [-].
+        delta_max: limit of the steering angle [rad].
         a_max: limit of the acceleration [m/s^2].
-        gap: bumper to bumper to the vehicle ahead in the lane, inf where there is none, shape (T,) [m].
-        lead_speed: of that vehicle, shape (T,) [m/s].
-        driver, automation: actual commands u_h,act and u_a,act over their limits, shape (T, 2) [-].
+        gap: gap to the vehicle ahead in the lane, bumper to bumper; inf without one, shape (T,) [m].
+        lead_speed: speed of the vehicle ahead, shape (T,) [m/s].
+        driver, automation: actual commands u_h,act and u_a,act as shares of the limits, shape (T, 2) [-].
         authority: alpha_a, shape (T,) [-].
-        degraded: whether a degradation is there, shape (T,).
-        crashed, left_road: how the episode ended.
-        solver_failures: steps at which a command was held because a solver failed, of automation and driver.
+        degraded: whether a degradation is active, shape (T,).
+        crashed, left_road: whether the episode ended in a collision, or off the road.
+        solver_failures: number of steps at which a solver of automation or driver failed, so that its last command was
+            held.
         wall_time: computing time [s].
     """
 
@@ -74,7 +76,7 @@ class Trajectory:
 
     @property
     def onset(self) -> int | None:
-        """First time step with a degradation, None without any."""
+        """Index of the first time step with a degradation; None without any."""
         return int(np.argmax(self.degraded)) if self.degraded.any() else None
 
 
@@ -82,10 +84,10 @@ class Metric(NamedTuple):
     """A metric.
 
     Attributes:
-        unit: of its value.
-        better: ``lower``, ``higher`` or ``neither``.
-        definition: in a sentence.
-        measure: its function; nan where it is not defined for the episode.
+        unit: unit of the value.
+        better: direction in which the metric is better: ``lower``, ``higher`` or ``neither``.
+        definition: definition in a sentence.
+        measure: function of a trajectory that returns the value; nan where the metric is not defined for the episode.
     """
 
     unit: str
@@ -102,14 +104,14 @@ METRICS: dict[str, Metric] = {}
 
 
 def metric(unit: str, better: str) -> Callable[[Callable[[Trajectory], float]], Callable[[Trajectory], float]]:
-    """Enter a function into :data:`METRICS` under its name, its docstring as the definition.
+    """Decorator that enters a function into :data:`METRICS` under its name. Its docstring becomes the definition.
 
     Args:
-        unit: of the value.
-        better: ``lower``, ``higher`` or ``neither``.
+        unit: unit of the value.
+        better: direction in which the metric is better: ``lower``, ``higher`` or ``neither``.
 
     Raises:
-        ValueError: for another direction, a function without a docstring, or a name that is taken.
+        ValueError: for an unknown direction, a function without a docstring, or a name that is taken.
     """
     if better not in BETTER:
         raise ValueError(f"better = {better!r}; {hint(better, BETTER)}")
@@ -126,10 +128,13 @@ def metric(unit: str, better: str) -> Callable[[Callable[[Trajectory], float]], 
 
 
 def measure_all(trajectory: Trajectory) -> dict[str, float]:
-    """Every metric of an episode.
+    """Compute all metrics of an episode.
 
     Args:
         trajectory: signals of the episode.
+
+    Returns:
+        Values by name of the metric.
     """
     return {name: float(entry.measure(trajectory)) for name, entry in METRICS.items()}
 
@@ -152,7 +157,7 @@ def road_departures(t: Trajectory) -> float:
 
 @metric("-", "lower")
 def lane_departures(t: Trajectory) -> float:
-    """Times that the centre of mass leaves the lane to keep: |y - y_target| rises over half a lane width."""
+    """Number of times that the centre of mass leaves the lane to keep: |y - y_target| rises over half a lane width."""
     out = _out_of_lane(t)
     return float(np.count_nonzero(out[1:] & ~out[:-1]) + out[0])
 
@@ -183,7 +188,7 @@ def min_gap(t: Trajectory) -> float:
 
 @metric("s", "higher")
 def min_thw(t: Trajectory) -> float:
-    """Smallest time headway: the gap to the vehicle ahead over the own speed, while moving faster than 1 m/s."""
+    """Smallest time headway: the gap to the vehicle ahead over the ego's speed, while moving faster than 1 m/s."""
     following = np.isfinite(t.gap) & (t.speed > 1.0)
     return float((t.gap[following] / t.speed[following]).min()) if following.any() else np.nan
 
@@ -214,7 +219,7 @@ def max_drac(t: Trajectory) -> float:
 
 @metric("s", "lower")
 def time_to_detect(t: Trajectory) -> float:
-    """Time from the onset until alpha_a first lies under 0.8; not defined without an onset or where it never does."""
+    """Time from the onset until alpha_a first lies below 0.8; not defined without an onset or if it never does."""
     if t.onset is None:
         return np.nan
     low = t.authority[t.onset :] < DETECTION_LEVEL
@@ -223,7 +228,7 @@ def time_to_detect(t: Trajectory) -> float:
 
 @metric("-", "lower")
 def missed_detection(t: Trajectory) -> float:
-    """1 if alpha_a never lies under 0.8 from the onset on, else 0; not defined without an onset."""
+    """1 if alpha_a never lies below 0.8 from the onset on, else 0; not defined without an onset."""
     return float(not (t.authority[t.onset :] < DETECTION_LEVEL).any()) if t.onset is not None else np.nan
 
 
@@ -260,7 +265,7 @@ def conflict(t: Trajectory) -> float:
 
 @metric("1/min", "lower")
 def steering_reversal_rate(t: Trajectory) -> float:
-    """Reversals of the front steering angle by more than 0.2 degrees a minute (Markkula & Engstrom 2006, no filter)."""
+    """Rate of reversals of the front steering angle by more than 0.2 degrees (Markkula & Engstrom 2006, no filter)."""
     steering = t.command[:, 1] * t.delta_max
     reversals, direction, extreme = 0, 0, steering[0]
     for angle in steering.tolist():
@@ -282,7 +287,7 @@ def lateral_acceleration_max(t: Trajectory) -> float:
 
 
 def _lateral_jerk(t: Trajectory) -> np.ndarray:
-    """Change of v_x r over half a second, divided by it, magnitudes [m/s^3]."""
+    """Magnitude of the change of v_x r over half a second, divided by that time [m/s^3]."""
     n = max(1, round(JERK_WINDOW / t.dt))
     lateral = t.speed * t.yaw_rate
     return np.abs(lateral[n:] - lateral[:-n]) / (n * t.dt)
@@ -343,4 +348,4 @@ def real_time_factor(t: Trajectory) -> float:
 
 
 STANDARD = tuple(METRICS)
-"""Names of the package's own; those that others add come after them."""
+"""Names of the metrics that the package defines; user-defined metrics come after them."""

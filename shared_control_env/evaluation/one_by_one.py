@@ -1,4 +1,4 @@
-"""Episodes in single environments, one after the other, for an automation that the kernel does not run."""
+"""Episodes in single environments, one after the other, for an automation that the kernel cannot run."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from shared_control_env.wrappers import AuthorityLimiter, DriverModel
 
 
 class SingleEnvironments:
-    """Single environments of one scenario behind what :func:`episodes.run` uses of the vectorised one.
+    """Single environments of one scenario, with those methods of the vectorised one that :func:`episodes.run` uses.
 
     Args:
         scenario: key of :data:`envs.scenarios.SCENARIOS`.
-        automations: one for each environment, with ``reset()`` and ``act(scene)``.
+        automations: one automation for each environment, with ``reset()`` and ``act(scene)``.
         config: changes to the scenario's settings.
         limiter: whether the fuzzy inference decides alpha_a.
-        driver: whether the predictive driver of the settings drives, by OSQP.
+        driver: whether the predictive driver of the settings drives, solved by OSQP.
         render_mode: ``rgb_array`` or None.
     """
 
@@ -50,22 +50,22 @@ class SingleEnvironments:
 
     @property
     def episodes(self) -> tuple[Settings, ...]:
-        """Settings of each episode, with all that is random drawn."""
+        """Settings of each episode, with all random values drawn."""
         return tuple(env.unwrapped.episode for env in self._envs)
 
     def views(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Scene and signals of each environment, 0-d records, which stay those of the present step."""
+        """Scenes and signals as lists of 0-d records, which always show the present step."""
         return [env.unwrapped.scene for env in self._envs], [env.unwrapped.signals for env in self._envs]
 
     def reset(self, *, seed: Sequence[int], options: Mapping[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin an episode in each environment.
 
         Args:
-            seed: one for each.
-            options: ``{"config": [...]}``, changes to the settings of each.
+            seed: one seed for each environment.
+            options: ``{"config": [...]}``, changes to the settings of each environment.
 
         Returns:
-            Observations and infos, a row for each.
+            Observations and infos, one row per environment.
         """
         for i, (env, own, config) in enumerate(zip(self._envs, seed, options["config"], strict=True)):
             observation, info = env.reset(seed=own, options={"config": config})
@@ -75,13 +75,13 @@ class SingleEnvironments:
         return observations, infos
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Drive one time step in every environment whose episode goes on; the others keep their last results.
+        """Drive one time step in every environment whose episode is running. The others keep their last results.
 
         Args:
-            actions: of the open slot, or a dict of both, a row for each environment.
+            actions: values of the open slot, or a dict of both slots, one row per environment.
 
         Returns:
-            Observations, rewards, terminations, truncations and infos, a row for each.
+            Observations, rewards, terminations, truncations and infos, one row per environment.
         """
         for i in np.flatnonzero(~self._ended):
             action = {slot: rows[i] for slot, rows in actions.items()} if isinstance(actions, dict) else actions[i]
@@ -99,13 +99,13 @@ class SingleEnvironments:
         return tuple(env.render() for env in self._envs)
 
     def close(self) -> None:
-        """Close all."""
+        """Close all environments."""
         for env in self._envs:
             env.close()
 
 
 def _stacked_infos(infos: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Nested dicts of numbers as one of arrays."""
+    """Stack nested dicts of numbers into one nested dict of arrays."""
     return {
         name: _stacked_infos([info[name] for info in infos])
         if isinstance(value, Mapping)

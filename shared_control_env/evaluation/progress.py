@@ -7,10 +7,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 
 def progress_bar(console: Console) -> Progress:
-    """A bar with the task's description, what is done of all, the time so far and the time that is left.
+    """A progress bar with description, completed and total count, elapsed time and remaining time.
 
     Args:
-        console: to show it on.
+        console: console that shows the bar.
     """
     return Progress(
         TextColumn("{task.description}"),

@@ -1,4 +1,4 @@
-"""One episode of the benchmark again: to see it, from its names or from the folder of a run."""
+"""Replay of one episode of the benchmark, identified by its names or by the folder of a run."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import read_manifest
 
 GIVEN = "given: "
-"""Begins a fingerprint that the user gave."""
+"""Prefix of a fingerprint that the user gave."""
 
 
 def replay_episode(
@@ -33,29 +33,31 @@ def replay_episode(
     config: Mapping[str, Any] | None = None,
     automation: Callable[[], Planner] | None = None,
 ) -> dict[str, float]:
-    """Run one episode, as the benchmark runs it.
+    """Run one episode in the same way as the benchmark.
 
     Args:
-        scenario, driver, authority, degradation, seed: as in the benchmark's table; no degradation for the
-            scenario's own.
-        frames: pictures of every step are appended, where a list is given.
-        config: changes to the scenario's settings, those of the benchmark.
-        automation: makes another automation; None for the predictive controller.
+        scenario: key of :data:`envs.scenarios.SCENARIOS`.
+        driver, authority: name and entry.
+        degradation: key of :data:`envs.degradations.DEGRADATIONS`; None for the scenario's own.
+        seed: seed of the episode.
+        frames: list to which pictures of every step are appended; None for no pictures.
+        config: changes to the scenario's settings; those of the benchmark.
+        automation: makes a user-defined automation; None for the predictive controller.
 
     Returns:
-        Its metrics.
+        Metrics of the episode by name.
     """
     (row,) = run(Batch(scenario, driver, authority, ((degradation, seed),), config or {}, automation), frames)
     return {name: row[name] for name in METRICS}
 
 
 class Entries(NamedTuple):
-    """What an episode of a benchmark was run with.
+    """Driver, authority, settings and automation of an episode of a benchmark.
 
     Attributes:
-        driver, authority: their entries.
+        driver, authority: entries of driver and authority.
         config: changes to the scenario's settings.
-        automation: makes another automation; None for the predictive controller.
+        automation: makes a user-defined automation; None for the predictive controller.
     """
 
     driver: DriverEntry
@@ -65,16 +67,16 @@ class Entries(NamedTuple):
 
 
 def entries_of(folder: Path, driver: str, authority: str) -> Entries:
-    """What an episode of the benchmark that a folder holds was run with.
+    """Read from a results folder what an episode of the benchmark was run with.
 
-    A user's own class is imported by its path, as from the present folder.
+    A user's own class is imported by its path, with the working directory in the import path.
 
     Args:
-        folder: of the benchmark.
-        driver, authority: their names there.
+        folder: folder of the results.
+        driver, authority: names in the results.
 
     Raises:
-        ValueError: if the folder has no such names, or a class is not found any more or has changed.
+        ValueError: if the results have no such names, or if a class is no longer found or has changed.
     """
     manifest = read_manifest(folder)
     if manifest["versions"] != versions():
@@ -97,7 +99,7 @@ def entries_of(folder: Path, driver: str, authority: str) -> Entries:
 
 
 def _check_additions(folder: Path, expected: Mapping[str, Mapping[str, str]]) -> None:
-    """Raise ValueError unless this program has added what the one that ran the benchmark had."""
+    """Raise ValueError unless this program has made the additions of the program that ran the benchmark."""
     present = described(additions())
     for table, entries in expected.items():
         for name, digest in entries.items():
@@ -111,12 +113,12 @@ def _check_additions(folder: Path, expected: Mapping[str, Mapping[str, str]]) ->
 
 
 def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:
-    """What makes a user's driver or allocator, imported."""
+    """Import the maker of a user's driver, allocator or automation."""
     if described["origin"] == "settings":
         return None
     if described["origin"] is None:
         raise ValueError(
-            f"{what} {name!r} is of the program that ran the benchmark and cannot be imported; replay its episodes "
+            f"{what} {name!r} belongs to the program that ran it and cannot be imported; replay its episodes "
             "there, by shared_control_env.evaluation.replay_episode"
         )
     module, _, path = described["origin"].partition(":")
@@ -136,7 +138,13 @@ def _make(what: str, name: str, described: Mapping[str, Any]) -> Any:
 
 
 def record(frames: Sequence[np.ndarray], path: Path, fps: int = 20) -> None:
-    """Write frames as an MP4 at the speed of the drive."""
+    """Write frames as an MP4 file.
+
+    Args:
+        frames: frames of shape (height, width, 3).
+        path: path of the file; its folder is made.
+        fps: frames per second [1/s].
+    """
     from moviepy import ImageSequenceClip
 
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The report on a benchmark's episodes: one HTML file that needs nothing else."""
+"""The report on the episodes of a benchmark: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
     from shared_control_env.evaluation.storage import ResultsFolder
 
 SHOWN = ("lateral_rms", "driver_effort", "conflict", "false_authority_loss")
-"""Metrics of the plots, as far as the table has them."""
+"""Metrics that are plotted if the table has them."""
 
 GALLERY = 20
-"""Failures shown."""
+"""Largest number of failed episodes that the report lists."""
 
 INK = "#010203"
-"""Stands for the page's text colour, which depends on the reader's light or dark scheme."""
+"""Placeholder for the text colour of the page, which depends on the light or dark scheme of the reader."""
 
 COLOURS = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", INK)
-"""Tol's bright palette, told apart by the colour-blind; its grey is darker here, to be seen on white."""
+"""Tol's bright palette, which is safe for colour-blind readers; its grey is darker here, to be visible on white."""
 
 STYLE: dict[Any, Any] = {
     "text.color": INK,
@@ -47,22 +47,22 @@ STYLE: dict[Any, Any] = {
     "figure.facecolor": "none",
     "axes.facecolor": "none",
     "savefig.facecolor": "none",
-    "text.parse_math": False,  # a dollar sign in a name is no formula
+    "text.parse_math": False,  # a dollar sign in a name does not start a formula
     "svg.fonttype": "none",
     "svg.hashsalt": "shared_control_env",
 }
-"""Of all plots: they take the page's colours, their text can be selected, and the same figure gives the same text."""
+"""Style of all plots: page colours, selectable text, and identical output for identical figures."""
 
 MARKERS = "osD^vP*X<>hd"
 
 
 class Cell(NamedTuple):
-    """A metric of one pair under one statistic.
+    """One metric of one pair of authority and driver under one statistic.
 
     Attributes:
-        interval: the numbers.
-        best: whether no other pair's estimate is better.
-        tied: whether it cannot be told from the best: the intervals overlap, or there are none.
+        interval: the estimate with its interval.
+        best: whether no other pair has a better estimate.
+        tied: whether the pair is not distinguishable from the best: the intervals overlap, or there are none.
     """
 
     interval: Interval
@@ -71,12 +71,12 @@ class Cell(NamedTuple):
 
 
 class Row(NamedTuple):
-    """One pair of the table.
+    """Row of the table for one pair of authority and driver.
 
     Attributes:
-        authority, driver: the pair.
-        episodes: how many.
-        cells: by metric, then by statistic.
+        authority, driver: names of the pair.
+        episodes: number of episodes.
+        cells: cells by metric, then by statistic.
     """
 
     authority: str
@@ -95,11 +95,11 @@ def write_report(
     """Write the report.
 
     Args:
-        table: one row an episode, as :func:`runner.evaluate` gives it.
-        metrics: its metrics.
-        path: of the HTML file.
-        provenance: what the results are of and were made with, shown as it is.
-        folder: that holds the results, which the commands that run an episode again read.
+        table: one row per episode, as returned by :func:`runner.evaluate`.
+        metrics: metrics of the table by name.
+        path: path of the HTML file.
+        provenance: description of the benchmark and its versions, shown unchanged.
+        folder: folder of the results, which the replay commands refer to; None without one.
     """
     environment = Environment(loader=PackageLoader("shared_control_env.evaluation", "."), autoescape=True)
     environment.filters["number"] = _number
@@ -117,7 +117,12 @@ def write_report(
 
 
 def summarise(table: pd.DataFrame, metrics: Mapping[str, Metric]) -> list[Row]:
-    """Rows of the table: every pair of authority and driver with all metrics."""
+    """Rows of the report's table: every pair of authority and driver with all metrics.
+
+    Args:
+        table: one row per episode.
+        metrics: metrics of the table by name.
+    """
     rng = np.random.default_rng(0)
     found: dict[tuple[str, str], dict[str, dict[str, Interval]]] = {}
     sizes = {}
@@ -145,7 +150,7 @@ def summarise(table: pd.DataFrame, metrics: Mapping[str, Metric]) -> list[Row]:
 
 
 def _best(candidates: Sequence[Interval], better: str) -> Interval | None:
-    """The best of some intervals in a metric's direction; None where there is none or all are the same."""
+    """The best interval in the direction of a metric; None if there is no direction or all estimates are equal."""
     defined = [interval for interval in candidates if interval.n > 0]
     if better == "neither" or len({interval.estimate for interval in defined}) < 2:
         return None
@@ -159,16 +164,16 @@ def _cell(interval: Interval, best: Interval | None) -> Cell:
 
 
 def _number(value: float) -> str:
-    """Three digits, and a dash for what is not defined."""
+    """A number with three significant digits; a dash if it is not finite."""
     return "–" if not np.isfinite(value) else f"{value:.3g}"
 
 
 def gallery(table: pd.DataFrame, folder: ResultsFolder | None = None) -> list[dict[str, Any]]:
-    """The worst failed episodes, spread over all that names them, with the command that shows each again.
+    """The worst failed episodes, spread over scenarios, degradations, drivers and authorities, with replay commands.
 
     Args:
-        table: one row an episode.
-        folder: that holds the results, for the command.
+        table: one row per episode.
+        folder: folder of the results for the replay commands; None without one.
     """
     names = ["scenario", "degradation", "driver", "authority", "seed"]
     failed = table[table["terminated"].astype(bool)] if len(table) else table
@@ -185,7 +190,7 @@ def gallery(table: pd.DataFrame, folder: ResultsFolder | None = None) -> list[di
 
 
 def _command(episode: Mapping[str, str], folder: ResultsFolder | None) -> str:
-    """How an episode is run again: a command, or what to do where the driver or authority cannot be found by one."""
+    """The replay command of an episode, or an instruction if the driver or authority cannot be imported."""
     for part, what in (("drivers", "driver"), ("authorities", "authority")) if folder is not None else ():
         if folder.manifest[part][episode[what]]["origin"] is None:  # type: ignore[union-attr]
             return f"by evaluation.replay_episode, in the program that has the {what} {episode[what]!r}"
@@ -195,14 +200,14 @@ def _command(episode: Mapping[str, str], folder: ResultsFolder | None) -> str:
 
 
 def _worst_first(failed: pd.DataFrame) -> pd.DataFrame:
-    """Collisions before departures from the road, and the sooner the worse, as far as the table has these columns."""
+    """Sort collisions before road departures, and early ends before late ones, if the table has these columns."""
     keys = {"collisions": False, "duration": True}
     present = [key for key in keys if key in failed]
     return failed.sort_values(present, ascending=[keys[key] for key in present], kind="stable") if present else failed
 
 
 def _spread(table: pd.DataFrame, names: Sequence[str], n: int) -> pd.DataFrame:
-    """Up to n rows: each time the first of those that have least in common with the rows already taken."""
+    """Choose up to n rows. Each choice is the first row with the fewest values in common with the chosen rows."""
     values = table[list(names)].astype(str).to_numpy()
     in_common = np.zeros(len(table))
     chosen: list[int] = []
@@ -216,7 +221,13 @@ def _spread(table: pd.DataFrame, names: Sequence[str], n: int) -> pd.DataFrame:
 def draw_plots(
     table: pd.DataFrame, rows: Sequence[Row], metrics: Mapping[str, Metric]
 ) -> list[tuple[str, str, Markup]]:
-    """Titles, explanations and pictures; those of metrics only where there are some to show."""
+    """Titles, explanations and pictures of the plots. Plots of metrics are left out if no metric is to be shown.
+
+    Args:
+        table: one row per episode.
+        rows: rows of the report's table.
+        metrics: metrics of the table by name.
+    """
     shown = {name: f"{name} [{metrics[name].unit}]" for name in SHOWN if name in metrics}
     plots = []
     with mpl.rc_context(STYLE):
@@ -233,7 +244,12 @@ def draw_plots(
 
 
 def draw_intervals(rows: Sequence[Row], shown: Mapping[str, str]) -> Figure:
-    """A panel a metric, labelled as ``shown`` says: authorities down, drivers side by side."""
+    """Draw interquartile means with their intervals: a panel per metric, authorities downwards, drivers by colour.
+
+    Args:
+        rows: rows of the report's table.
+        shown: labels of the panels by metric.
+    """
     authorities, drivers = (list(dict.fromkeys(getattr(row, key) for row in rows)) for key in ("authority", "driver"))
     figure, axes = _panels(len(shown), 0.5 + len(authorities) * (0.25 + 0.1 * len(drivers)))
     looks: list[dict[str, Any]] = [
@@ -255,7 +271,12 @@ def draw_intervals(rows: Sequence[Row], shown: Mapping[str, str]) -> Figure:
 
 
 def draw_distributions(table: pd.DataFrame, shown: Mapping[str, str]) -> Figure:
-    """A panel a metric, labelled as ``shown`` says: share of episodes under a value, by authority."""
+    """Draw empirical distributions: a panel per metric with the share of episodes up to a value, by authority.
+
+    Args:
+        table: one row per episode.
+        shown: labels of the panels by metric.
+    """
     groups = {str(authority): part for authority, part in table.groupby("authority", sort=False)}
     looks: list[dict[str, Any]] = [
         {"color": COLOURS[i % len(COLOURS)], "ls": "-" if i < len(COLOURS) else "--"} for i in range(len(groups))
@@ -274,12 +295,16 @@ def draw_distributions(table: pd.DataFrame, shown: Mapping[str, str]) -> Figure:
 
 
 def _legend(figure: Figure, names: Sequence[str], looks: Sequence[Mapping[str, Any]]) -> None:
-    """Under the panels; made of the names, as no one panel need have them all."""
+    """Add a legend below the panels. It is made from the names, because no single panel may have them all."""
     figure.legend([Line2D([], [], **look) for look in looks], names, loc="outside lower center", ncols=6, frameon=False)
 
 
 def draw_failures(table: pd.DataFrame) -> Figure:
-    """Share of episodes that end in a collision or off the road."""
+    """Draw the share of episodes that end in a collision or off the road, by degradation and authority.
+
+    Args:
+        table: one row per episode.
+    """
     rates = 100.0 * table.pivot_table(
         index="degradation", columns="authority", values="terminated", aggfunc="mean", sort=False
     ).astype(float)
@@ -307,12 +332,12 @@ def _panels(n: int, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def _svg(figure: Figure, name: str) -> Markup:
-    """A figure as an SVG element with ids of its own, in the page's colours."""
+    """A figure as an SVG element with unique ids, in the colours of the page."""
     buffer = io.StringIO()
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph")  # the reader's fonts have it, perhaps: text stays text
+        warnings.filterwarnings("ignore", "Glyph")  # text is not drawn as paths, so the reader's fonts decide
         figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = buffer.getvalue()
     text = text[text.index("<svg") :].replace(INK, "currentColor")
-    own = rf"\1{name}-"  # the page holds several pictures, and an id counts once a page
+    own = rf"\1{name}-"  # the page holds several pictures, and an id must be unique in the page
     return Markup(re.sub("<[^>]+>", lambda tag: re.sub(r'(\bid="|url\(#|href="#)', own, tag[0]), text))

@@ -1,4 +1,4 @@
-"""``evaluate``: drivers and authorities on a suite, as a table of one row an episode."""
+"""``evaluate``: runs drivers and authorities on a suite, and returns a table with one row per episode."""
 
 from __future__ import annotations
 
@@ -57,34 +57,37 @@ def evaluate(
     """Run every episode of a suite with every driver under every authority.
 
     Args:
-        driver: a name of :data:`catalogue.DRIVERS`, several, ``all``, or your own: a mapping of names to whatever makes
-            a :class:`~shared_control_env.controllers.driver.Driver`, such as its class; ``act`` gives m/s^2 and rad.
-        authority: the same of :data:`catalogue.AUTHORITIES`; your own
-            :class:`~shared_control_env.controllers.allocators.Allocator` acts by the law ``proportional`` unless
+        driver: a name of :data:`catalogue.DRIVERS`, several names, ``all``, or your own drivers as a mapping of names
+            to makers. A maker returns a :class:`~shared_control_env.controllers.driver.Driver`, such as its class
+            does; ``act`` returns the command in m/s^2 and rad.
+        authority: likewise for :data:`catalogue.AUTHORITIES`. Your own
+            :class:`~shared_control_env.controllers.allocators.Allocator` acts by the law ``proportional`` unless it is
             given as an :class:`AuthorityEntry`.
-        suite: a name of :data:`catalogue.SUITES`, or your own.
-        seeds: of the episodes; one seed gives every driver and authority the same episode.
-        config: changes to the settings of all scenarios. What makes an entry what it is, such as the lag of ``mpc_1``,
+        suite: a name of :data:`catalogue.SUITES`, or your own suite.
+        seeds: seeds of the episodes; a seed gives the same episode to every driver and authority.
+        config: changes to the settings of all scenarios. Settings that define an entry, such as the lag of ``mpc_1``,
             cannot be changed.
-        automation: makes another automation for each episode, such as its class, with ``reset()`` and ``act(scene)``;
-            its episodes run one by one, without the kernel.
-        out: folder to keep the results in, as they come; a run that was stopped goes on from there. With it
-            ``episodes.parquet`` and ``report.html`` are written at the end. Where a driver or an allocator of your own
-            has changed its episodes are run again.
-        fresh: remove the results of another benchmark that the folder holds.
-        jobs: processes. They import the program that starts them: a script calls this under
-            ``if __name__ == "__main__":``, and your own drivers must be picklable by name, so not of a notebook.
-        engine: ``local``, or ``ray`` for the Ray cluster that is connected, or one started here.
-        progress: called with the number of episodes done and of all.
+        automation: makes a user-defined automation for each episode, such as its class, with ``reset()`` and
+            ``act(scene)``. Its episodes run one by one, without the kernel.
+        out: folder that stores the results as they are completed; an interrupted run resumes from there. At the end
+            ``episodes.parquet`` and ``report.html`` are written into it. If one of your own drivers or allocators has
+            changed, its episodes are run again.
+        fresh: remove the results of another benchmark from the folder.
+        jobs: number of processes. They import the program that starts them, so a script must call this function under
+            ``if __name__ == "__main__":``. Your own drivers must be picklable by name, so they cannot be defined in a
+            notebook.
+        engine: ``local``, or ``ray`` for the connected Ray cluster, or for one that is started here.
+        progress: called with the number of completed episodes and the number of all episodes.
 
     Returns:
-        One row an episode: scenario, degradation, driver, authority, seed, whether it was terminated, its
-        duration [s], the driver's K_h and T_h [s], when a person at rest noticed something [s], every metric of
-        :data:`metrics.METRICS`, digest of its settings, versions.
+        One row per episode: scenario, degradation, driver, authority, seed, whether it was terminated, its
+        duration [s], the driver's K_h [-] and T_h [s], the time at which a person at rest noticed something [s], every
+        metric of :data:`metrics.METRICS`, the digest of its settings, and the versions.
 
     Raises:
-        ValueError: for unknown names, naming the nearest and all valid ones; for what makes no driver or allocator, or
-            settings that do not go together; or for a folder of another benchmark. All of it before anything is run.
+        ValueError: for unknown names, with the nearest and all valid ones; for an entry that does not make a driver or
+            allocator; for settings that contradict each other; or for a folder of another benchmark. All checks are
+            made before the first episode runs.
     """
     drivers, authorities, chosen = chosen_drivers(driver), chosen_authorities(authority), chosen_suite(suite)
     numbers = _checked_seeds(seeds)
@@ -128,7 +131,7 @@ def evaluate(
 
 
 def _checked_seeds(seeds: Iterable[int]) -> list[int]:
-    """Seeds as integers that a table's column holds, each once."""
+    """Check the seeds: integers that fit a column of the table. Duplicates are removed."""
     if not isinstance(seeds, Iterable) or isinstance(seeds, str | bytes):
         raise ValueError(f"seeds = {seeds!r} must be several integers, such as range(10)")
     numbers: dict[int, None] = {}
@@ -138,14 +141,14 @@ def _checked_seeds(seeds: Iterable[int]) -> list[int]:
             raise ValueError(f"seeds: an entry = {seed!r} must be an integer in [0, {2**63 - 1}]")
         numbers[number] = None
         if len(numbers) > MOST_SEEDS:
-            raise ValueError(f"seeds has more than {MOST_SEEDS} entries, the largest number of them")
+            raise ValueError(f"seeds has more than {MOST_SEEDS} entries, the largest number allowed")
     if not numbers:
         raise ValueError("seeds is empty; it must hold at least one integer")
     return list(numbers)
 
 
 def _check_settings(batches: Sequence[Batch]) -> None:
-    """Raise what would keep an episode from being run, before any is."""
+    """Check the settings of all batches before the first episode runs."""
     seen = set()
     for batch in batches:
         config = settings_of(batch, batch.episodes[0][0])
@@ -162,10 +165,10 @@ def _check_settings(batches: Sequence[Batch]) -> None:
 def _described(
     what: str, name: str, entry: DriverEntry | AuthorityEntry, known: Mapping[str, DriverEntry | AuthorityEntry]
 ) -> dict[str, Any]:
-    """What a folder remembers of an entry: whether it is the same, and how it is found again.
+    """Description of an entry in the manifest of a folder: its identity, and where to find it again.
 
-    ``origin`` is ``catalogue``; ``settings`` for what the kernel runs; the path ``module:name`` of a class or function;
-    or None where there is no such path.
+    ``origin`` is ``catalogue``; ``settings`` for an entry that the kernel runs; the path ``module:name`` of a class or
+    function; or None if there is no such path.
     """
     own: dict[str, Any] = (
         {"law": entry.law}
@@ -185,7 +188,7 @@ def _described(
 def _origin_and_fingerprint(
     what: str, name: str, make: Callable[..., Any], given: str | None = None
 ) -> dict[str, str | None]:
-    """Where a user's class or function is found again, and what tells it from others."""
+    """Import path of a user's class or function, and the fingerprint that distinguishes it from others."""
     module, path = getattr(make, "__module__", None), getattr(make, "__qualname__", None)
     found = module not in (None, "__main__", "__mp_main__") and path is not None and "<" not in path
     try:
@@ -207,7 +210,7 @@ def _progressing(
     done: int,
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[tuple[Batch, engines.Rows]]:
-    """The results as they come, each told to ``progress``."""
+    """Pass the results on as they come, and report each to ``progress``."""
     report = progress or (lambda done, total: None)
     total = sum(len(batch.episodes) for batch in batches)
     report(done, total)
@@ -218,7 +221,7 @@ def _progressing(
 
 
 def _finish(folder: ResultsFolder) -> pd.DataFrame:
-    """Write the table and the report."""
+    """Write the table and the report, and return the table."""
     from shared_control_env.evaluation.metrics import METRICS
     from shared_control_env.evaluation.report import write_report
 

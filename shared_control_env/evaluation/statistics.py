@@ -1,11 +1,12 @@
 """Means of episodes with their uncertainty: interquartile means and stratified bootstrap intervals.
 
-As Agarwal et al. recommend (Deep Reinforcement Learning at the Edge of the Statistical Precipice, NeurIPS 2021):
-episodes are resampled within their stratum (scenario and degradation), and the interval is that of percentiles.
+The method follows Agarwal et al. (Deep Reinforcement Learning at the Edge of the Statistical Precipice, NeurIPS 2021):
+episodes are resampled within their stratum (scenario and degradation), and the interval is the percentile interval.
 
-A stratum is resampled from as many values as it has, so its variance comes out short by 1 / (values a stratum): with
-few seeds the intervals are too narrow. Of normal values in 30 strata the nominal 95 % cover the mean in 83 % of the
-cases with 2 seeds, 88 % with 3, 91 % with 5, 94 % with 10 or 20. A stratum of one value adds no width at all.
+Each stratum is resampled with as many values as it has. This underestimates the variance by a share of
+1 / (values per stratum), so the intervals are too narrow with few seeds. For normal values in 30 strata, the nominal
+95 % interval covers the mean in 83 % of the cases with 2 seeds, 88 % with 3, 91 % with 5, and 94 % with 10 or 20. A
+stratum with one value adds no width at all.
 """
 
 from __future__ import annotations
@@ -17,18 +18,18 @@ import numpy as np
 from scipy import stats
 
 RESAMPLES = 1000
-"""Of the bootstrap."""
+"""Number of bootstrap samples."""
 
 COVERAGE = 95.0
-"""Of the intervals [%]."""
+"""Nominal coverage of the intervals [%]."""
 
 
 class Interval(NamedTuple):
     """A statistic with its bootstrap interval; nan without a value.
 
     Attributes:
-        estimate: of the values.
-        low, high: ends of the interval; nan where no stratum has two values, as with a single seed.
+        estimate: estimate of the statistic from the values.
+        low, high: ends of the interval; nan if no stratum has two values, as with a single seed.
         n: number of finite values.
     """
 
@@ -38,17 +39,29 @@ class Interval(NamedTuple):
     n: int
 
     def distinct_from(self, other: Interval) -> bool:
-        """Whether the intervals have no number in common; without an interval nothing can be told apart."""
+        """Whether the intervals do not overlap; False if one of them has no ends.
+
+        Args:
+            other: the other interval.
+        """
         return self.low > other.high or other.low > self.high
 
 
 def mean(values: np.ndarray) -> float:
-    """Mean of values, shape (n,)."""
+    """Mean of values.
+
+    Args:
+        values: values, shape (n,).
+    """
     return float(np.mean(values))
 
 
 def interquartile_mean(values: np.ndarray) -> float:
-    """Mean of the middle half of values, shape (n,): a quarter, rounded down, is left out at each end."""
+    """Mean of the middle half of values: a quarter of them, rounded down, is left out at each end.
+
+    Args:
+        values: values, shape (n,).
+    """
     return float(stats.trim_mean(values, 0.25))
 
 
@@ -56,17 +69,21 @@ def means_of_samples(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """:func:`mean` of every sample, shape (samples,).
 
     Args:
-        values: shape (n,).
-        counts: how often each value is in each sample, shape (samples, n).
+        values: values, shape (n,).
+        counts: how often each value occurs in each sample, shape (samples, n).
     """
     return counts @ values / len(values)
 
 
 def interquartile_means_of_samples(values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """:func:`interquartile_mean` of every sample, shape (samples,); arguments as in :func:`means_of_samples`.
+    """:func:`interquartile_mean` of every sample, shape (samples,).
 
-    The sum over the middle half is taken by parts, from how many of a sample lie at or below each value: no sample
-    has to be sorted.
+    The sum over the middle half is computed by summation by parts, from the number of entries of a sample at or below
+    each value. No sample has to be sorted.
+
+    Args:
+        values: values, shape (n,).
+        counts: how often each value occurs in each sample, shape (samples, n).
     """
     n, left_out = len(values), len(values) // 4
     order = np.argsort(values, kind="stable")
@@ -80,8 +97,8 @@ class Statistic(NamedTuple):
     """A statistic.
 
     Attributes:
-        of_values: of values, shape (n,).
-        of_samples: of every sample, from values and counts as in :func:`means_of_samples`.
+        of_values: function that computes the statistic of values, shape (n,).
+        of_samples: function that computes the statistic of every sample; arguments as in :func:`means_of_samples`.
     """
 
     of_values: Callable[[np.ndarray], float]
@@ -101,10 +118,10 @@ def resample(strata: np.ndarray, rng: np.random.Generator, resamples: int = RESA
     Args:
         strata: stratum of every value, shape (n,).
         rng: generator.
-        resamples: how many samples.
+        resamples: number of samples.
 
     Returns:
-        How often each value is in each sample, shape (resamples, n).
+        How often each value occurs in each sample, shape (resamples, n).
     """
     _, stratum, size = np.unique(strata, return_inverse=True, return_counts=True)
     members, first = np.argsort(stratum, kind="stable"), np.cumsum(size) - size
@@ -116,16 +133,16 @@ def resample(strata: np.ndarray, rng: np.random.Generator, resamples: int = RESA
 def intervals(
     columns: Mapping[str, np.ndarray], strata: np.ndarray, rng: np.random.Generator, resamples: int = RESAMPLES
 ) -> dict[str, dict[str, Interval]]:
-    """Every statistic of some columns with its interval.
+    """Every statistic of several columns with its interval.
 
-    Values that are not finite are those of episodes for which the metric is not defined; they are left out. Columns
-    that are defined for the same episodes share their samples.
+    Non-finite values belong to episodes for which the metric is not defined; they are left out. Columns that are
+    defined for the same episodes share their bootstrap samples.
 
     Args:
         columns: values by name, each of shape (n,).
         strata: stratum of every value, shape (n,).
         rng: generator.
-        resamples: of the bootstrap.
+        resamples: number of bootstrap samples.
 
     Returns:
         Intervals by column, then by statistic.
@@ -145,7 +162,7 @@ def intervals(
 
 
 def _interval(values: np.ndarray, counts: np.ndarray | None, statistic: Statistic) -> Interval:
-    """A statistic of finite values; without an interval where there are no samples."""
+    """A statistic of finite values; without an interval if there are no samples."""
     if len(values) == 0:
         return Interval(np.nan, np.nan, np.nan, 0)
     estimate = statistic.of_values(values)

@@ -1,4 +1,4 @@
-"""The folder that a benchmark's results grow in: whole files, of one benchmark, written by one run at a time."""
+"""The folder that stores the results of one benchmark: complete files, written by one run at a time."""
 
 from __future__ import annotations
 
@@ -14,43 +14,50 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 MANIFEST = "benchmark.json"
-"""What the results in a folder are of."""
+"""File that describes the benchmark of the results in a folder."""
 
 TABLE, REPORT = "episodes.parquet", "report.html"
-"""All episodes in one table, and the report on them."""
+"""Files with the table of all episodes, and with the report on them."""
 
 BATCHES = "episodes"
-"""Folder of the batches' files."""
+"""Folder with the files of the batches."""
 
 IDENTITY = ["scenario", "degradation", "driver", "authority", "seed"]
-"""Columns that name an episode."""
+"""Columns that identify an episode."""
 
 FORMAT = "shared_control_env benchmark 2"
-"""Says in a manifest what the folder is, and how it is laid out."""
+"""Entry of a manifest that identifies the folder and its layout."""
 
 MAY_GROW = ("drivers", "authorities")
-"""Parts of the manifest that a later run may add to or replace entries of; all others must be the same."""
+"""Parts of the manifest in which a later run may add or replace entries. All other parts must be equal."""
 
 _LOCK = ".lock"
 _DRAFT = ".draft-"
 _BATCH = re.compile(r"(([0-9a-f]{8})-([0-9a-f]{8})-([0-9a-f]{8})-[0-9a-f]{16})-([0-9a-f]{16})\.parquet")
-"""Name of a batch's file: digests of the benchmark, driver, authority and batch, then of the file's content."""
+"""Name of the file of a batch: digests of the benchmark, driver, authority and batch, then of the file's content."""
 
 
 def digest(content: bytes | str, length: int = 16) -> str:
-    """The first digits of the SHA-256 of bytes, or of a text."""
+    """The first hexadecimal digits of the SHA-256 of bytes or of a text.
+
+    Args:
+        content: bytes or text.
+        length: number of digits.
+    """
     return sha256(content.encode() if isinstance(content, str) else content).hexdigest()[:length]
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` fill a file beside the path, then move it there: a kill, a full disk or a power cut leaves no half.
+    """Let ``write`` fill a file beside the path, then move the file to the path.
+
+    A killed process, a full disk or a power cut leaves no incomplete file at the path.
 
     Args:
-        path: of the file; its folder is made.
-        write: given the path to fill.
+        path: path of the file; its folder is made.
+        write: function that is called with the path to fill.
 
     Raises:
-        OSError: where it cannot be written; what was there before is still there.
+        OSError: if the file cannot be written; an earlier file at the path is kept.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f"{_DRAFT}{path.name}")
@@ -65,8 +72,8 @@ def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
 
 
 def _flush(path: Path) -> None:
-    """Have the disk hold what was written to a file or folder, where the system can."""
-    if path.is_dir() and os.name == "nt":  # which opens no folders
+    """Flush a file or folder to the disk, if the system supports this."""
+    if path.is_dir() and os.name == "nt":  # Windows cannot open folders
         return
     handle = os.open(path, os.O_RDONLY if os.name != "nt" else os.O_RDWR)
     try:
@@ -76,32 +83,32 @@ def _flush(path: Path) -> None:
 
 
 class ResultsFolder:
-    """Results of one benchmark, a file a batch. It is this run's alone until :meth:`close`.
+    """Results of one benchmark, one file per batch. The folder is locked for this run until :meth:`close`.
 
     Args:
-        path: the folder; made, or resumed where it holds results of the same benchmark.
-        manifest: what the benchmark is: suite, seeds, config, versions, and each driver and authority by name.
-        fresh: remove the results of another benchmark; files that are no results stay.
+        path: path of the folder. It is made if needed; results of the same benchmark are resumed.
+        manifest: description of the benchmark: suite, seeds, config, versions, and each driver and authority by name.
+        fresh: remove the results of another benchmark; files that are not results are kept.
 
     Attributes:
-        path: the folder.
-        manifest: what it holds the results of.
-        notices: what was found and is worth a line.
+        path: path of the folder.
+        manifest: description of the benchmark.
+        notices: messages about the state of the folder, one line each.
 
     Raises:
-        ValueError: if the folder holds something else, naming what differs; if another run writes there; or if it
-            cannot be written to.
+        ValueError: if the folder holds other files or results, with the difference; if another run writes there; or if
+            the folder cannot be written to.
     """
 
     def __init__(self, path: Path, manifest: Mapping[str, Any], fresh: bool = False) -> None:
         self.path, self.notices = path, list[str]()
-        wanted: dict[str, Any] = {"format": FORMAT, **json.loads(json.dumps(manifest))}  # as it will be read again
+        wanted: dict[str, Any] = {"format": FORMAT, **json.loads(json.dumps(manifest))}  # in the form read from JSON
         self._lock = FileLock(path / _LOCK)
         try:
             if path.exists() and not path.is_dir():
                 raise ValueError(f"{path} is a file; choose a folder for the results")
             if path.exists() and _entries(path):
-                read_manifest(path)  # lest a lock is put into a foreign folder
+                read_manifest(path)  # raises before a lock file is put into a foreign folder
             path.mkdir(parents=True, exist_ok=True)
             self._lock.acquire(timeout=0)
         except Timeout:
@@ -127,17 +134,17 @@ class ResultsFolder:
             raise
 
     def close(self) -> None:
-        """Let other runs write to the folder."""
+        """Release the folder, so that other runs can write to it."""
         self._lock.release()
 
     def _joined(self, there: Mapping[str, Any], wanted: Mapping[str, Any]) -> dict[str, Any]:
-        """The manifest with what this run adds to it."""
+        """The manifest with the additions of this run."""
         for part in {**there, **wanted}:
             value = wanted.get(part)
             if part not in MAY_GROW and there.get(part) != value:
                 raise ValueError(
                     f"{self.path} holds results with {part} = {there.get(part)!r}, not {value!r}; they are not mixed: "
-                    "choose another folder, or have them replaced (--fresh)"
+                    "choose another folder, or replace them (--fresh)"
                 )
         for part in MAY_GROW:
             changed = [
@@ -153,7 +160,7 @@ class ResultsFolder:
         return {**wanted, **{part: {**there[part], **wanted[part]} for part in MAY_GROW}}
 
     def _remove_results(self) -> None:
-        """Remove what a benchmark wrote, and nothing else."""
+        """Remove the files that a benchmark wrote, and no others."""
         for name in (MANIFEST, TABLE, REPORT):
             (self.path / name).unlink(missing_ok=True)
         for path in (self.path / BATCHES).glob("*.parquet"):
@@ -161,10 +168,10 @@ class ResultsFolder:
                 path.unlink()
 
     def _whole_files(self) -> dict[str, Path]:
-        """Files of this benchmark's batches by their keys; damaged ones are removed, foreign ones noted."""
+        """Files of this benchmark's batches by their keys. Damaged files are removed; foreign files are reported."""
         files, foreign, damaged = {}, [], 0
         for folder in (self.path, self.path / BATCHES):
-            for draft in folder.glob(f"{_DRAFT}*"):  # of a run that was killed
+            for draft in folder.glob(f"{_DRAFT}*"):  # left by a run that was killed
                 if _is_own_draft(draft.name):
                     draft.unlink()
         for path in sorted((self.path / BATCHES).glob("*")):
@@ -190,23 +197,29 @@ class ResultsFolder:
         return "-".join([self._benchmark, *whose, digest(batch)])
 
     def has(self, driver: str, authority: str, batch: str) -> bool:
-        """Whether the rows of a batch are there.
+        """Whether the rows of a batch are stored.
 
         Args:
-            driver, authority: their names.
-            batch: text that says what is in it.
+            driver, authority: names of driver and authority.
+            batch: text that identifies the episodes of the batch.
         """
         return self._key(driver, authority, batch) in self._files
 
     def add(self, driver: str, authority: str, batch: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Keep a batch's rows; arguments as those of :meth:`has`."""
+        """Store the rows of a batch.
+
+        Args:
+            driver, authority: names of driver and authority.
+            batch: text that identifies the episodes of the batch.
+            rows: rows of the table, one per episode.
+        """
         content, key = pd.DataFrame(rows).to_parquet(), self._key(driver, authority, batch)
         path = self.path / BATCHES / f"{key}-{digest(content)}.parquet"
         write_atomically(path, lambda draft: draft.write_bytes(content))
         self._files[key] = path
 
     def table(self) -> pd.DataFrame:
-        """All episodes so far of the drivers and authorities as they are now, in the order of their names."""
+        """All stored episodes of the present versions of drivers and authorities, in the order of their names."""
         drivers, authorities = (
             {_digest_of(self.manifest[part], name) for name in self.manifest[part]} for part in MAY_GROW
         )
@@ -219,7 +232,7 @@ class ResultsFolder:
 
 
 def _identity(entry: Mapping[str, Any]) -> dict[str, Any]:
-    """What makes an entry the one that it is: all but where it was found."""
+    """The identity of an entry: everything except its origin."""
     return {name: value for name, value in entry.items() if name != "origin"}
 
 
@@ -228,21 +241,24 @@ def _digest_of(entries: Mapping[str, Any], name: str) -> str:
 
 
 def _entries(path: Path) -> list[str]:
-    """What a folder holds, without what a run that did not get far leaves."""
+    """Names of the files in a folder, without the lock file and drafts of an aborted run."""
     return [entry.name for entry in path.iterdir() if entry.name != _LOCK and not _is_own_draft(entry.name)]
 
 
 def _is_own_draft(name: str) -> bool:
-    """Whether a file is one that :func:`write_atomically` left half written in such a folder."""
+    """Whether a file is an incomplete draft that :func:`write_atomically` left in a results folder."""
     written = name.removeprefix(_DRAFT)
     return written != name and (written in (MANIFEST, TABLE, REPORT) or _BATCH.fullmatch(written) is not None)
 
 
 def read_manifest(path: Path) -> dict[str, Any]:
-    """What the results in a folder are of.
+    """Read the description of the benchmark whose results a folder holds.
+
+    Args:
+        path: path of the folder.
 
     Raises:
-        ValueError: if it holds no results of a benchmark, or of a version with another layout.
+        ValueError: if the folder holds no results of a benchmark, or results with the layout of another version.
     """
     if not path.exists():
         raise ValueError(f"{path}: there is no such folder")
@@ -254,11 +270,15 @@ def read_manifest(path: Path) -> dict[str, Any]:
     if not whole or not all(isinstance(manifest.get(part), dict) for part in MAY_GROW):
         raise ValueError(
             f"{path} holds files that are no results of a benchmark of this version; choose another folder, or remove "
-            "what is in it by hand"
+            "its content by hand"
         )
     return manifest
 
 
 def sorted_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Episodes in the order of their names, however they came in."""
+    """Sort a table by the columns that identify an episode.
+
+    Args:
+        table: one row per episode.
+    """
     return table.sort_values(IDENTITY, ignore_index=True)

@@ -1,4 +1,4 @@
-"""Many environments in one kernel."""
+"""The vectorised environment: many environments stepped by one compiled kernel."""
 
 from shared_control_env.vector.environment import Rollout, SharedControlVectorEnv
 

@@ -1,4 +1,4 @@
-"""What users give the vectorised environment, checked: actions, masks, seeds, modes and settings."""
+"""Checks of what users pass to the vectorised environment: actions, masks, seeds, modes and settings."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from shared_control_env.envs.settings import OWN_TRAFFIC, Settings
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLACK, SLOT_SPACES, Clipping
 
 ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_vehicles_type", "reward_terms")
-"""Settings that all environments share."""
+"""Settings that must be equal in all environments."""
 
 
 class Actions(NamedTuple):
-    """Both slots of every environment's action; zeros for a bound one.
+    """Both slots of the actions of all environments. A bound slot holds zeros.
 
     Attributes:
-        commands: driver's commands over their limits, (N, 2).
-        alphas: authorities, (N, 1).
+        commands: the driver's commands as shares of their limits, shape (N, 2) [-].
+        alphas: authorities alpha_a, shape (N, 1) [-].
     """
 
     commands: np.ndarray
@@ -34,11 +34,17 @@ class Actions(NamedTuple):
 
 
 class OpenSlots:
-    """The slots of the action that nobody bound, and the check of what is given for them.
+    """The slots of the action that are not bound, and the check of their values.
 
     Args:
-        num_envs: of how many environments.
-        slots: names of the open ones.
+        num_envs: number of environments N.
+        slots: names of the open slots.
+
+    Attributes:
+        num_envs: number of environments N.
+        slots: names of the open slots.
+        nothing: actions with zeros in both slots.
+        clipping: counts the values beyond their bounds.
     """
 
     def __init__(self, num_envs: int, slots: tuple[str, ...]) -> None:
@@ -48,13 +54,16 @@ class OpenSlots:
         self._bounds = {slot: (SLOT_SPACES[slot].low[0], SLOT_SPACES[slot].high[0]) for slot in slots}
 
     def checked(self, actions: Any) -> Actions:
-        """Commands and authorities of one step, with zeros for what is bound.
+        """Check the actions of one step. Bound slots are filled with zeros.
 
         Args:
-            actions: of the open slot, or a dict of both.
+            actions: values of the open slot, shape (N, size) [-], or a dict of both slots.
+
+        Returns:
+            Commands and authorities of all environments.
 
         Raises:
-            ValueError: if a slot is missing, or has another shape, or an entry is not finite.
+            ValueError: if a slot is missing, its shape is wrong, or an entry is not finite.
         """
         n = self.num_envs
         given = actions if len(self.slots) == 2 else dict.fromkeys(self.slots, actions)
@@ -80,15 +89,19 @@ class OpenSlots:
 
 
 def checked_mask(mask: Any, num_envs: int, started: bool) -> np.ndarray:
-    """The environments that a reset names, a new array of shape (num_envs,).
+    """Check the mask of a reset.
 
     Args:
-        mask: as given; None for all.
-        num_envs: how many there are.
-        started: whether all have been reset before.
+        mask: the mask that the user gave; None for all environments.
+        num_envs: number of environments.
+        started: whether all environments have been reset before.
+
+    Returns:
+        Mask of the environments to reset, a new bool array of shape (num_envs,).
 
     Raises:
-        ValueError: if it is no bool array of this shape, or names none, or leaves any out at the first reset.
+        ValueError: if the mask is no bool array of this shape, is False everywhere, or omits an environment at the
+            first reset.
     """
     if mask is None:
         return np.ones(num_envs, dtype=bool)
@@ -105,14 +118,14 @@ def checked_mask(mask: Any, num_envs: int, started: bool) -> np.ndarray:
 def checked_generators(
     seed: int | Sequence[int | None] | None, num_envs: int
 ) -> list[tuple[np.random.Generator, int] | None]:
-    """Generator and seed of each environment, None where none is given.
+    """Generator and seed of each environment; None for an environment without a given seed.
 
     Args:
-        seed: one for all, which counts up from environment to environment, or one for each.
-        num_envs: how many there are.
+        seed: an integer, so that environment i gets seed + i, or one seed for each environment.
+        num_envs: number of environments.
 
     Raises:
-        ValueError: for what is no seed, or another number of them.
+        ValueError: for an invalid seed, or a wrong number of seeds.
     """
     if seed is None:
         return [None] * num_envs
@@ -125,15 +138,15 @@ def checked_generators(
 
 
 def checked_count(name: str, value: Any, otherwise: str = "") -> int:
-    """A number of things, at least one.
+    """Check a count, which is an integer of at least 1.
 
     Args:
-        name: of the argument.
-        value: as given.
-        otherwise: what else is allowed, for the message.
+        name: name of the argument, for the error message.
+        value: the value that the user gave.
+        otherwise: text for the error message about other allowed values.
 
     Raises:
-        ValueError: if it is no integer of at least 1.
+        ValueError: if the value is no integer of at least 1.
     """
     if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < 1:
         raise ValueError(f"{name} = {value!r} must be an integer of at least 1{otherwise}")
@@ -141,13 +154,13 @@ def checked_count(name: str, value: Any, otherwise: str = "") -> int:
 
 
 def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    """Gymnasium's autoreset mode.
+    """Convert an autoreset mode to Gymnasium's enumeration.
 
     Args:
-        mode: itself, its name or its value, such as ``same_step`` or ``SameStep``.
+        mode: the mode, its name or its value, such as ``same_step`` or ``SameStep``.
 
     Raises:
-        ValueError: for another.
+        ValueError: for an unknown mode.
     """
     if isinstance(mode, AutoresetMode):
         return mode
@@ -160,14 +173,14 @@ def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 
 def settings_for_kernel(scenario: Scenario, config: Mapping[str, Any]) -> Settings:
-    """Settings of a scenario with changes, checked, those too that the kernel alone refuses.
+    """Settings of a scenario with changes, after all checks, those for the kernel included.
 
     Args:
-        scenario: whose settings are the defaults.
-        config: what differs.
+        scenario: scenario that provides the defaults.
+        config: changes to the settings.
 
     Raises:
-        ValueError: for a wrong setting, or one that the single environment alone has.
+        ValueError: for a wrong setting, or a setting that only the single environment supports.
     """
     default = configuration.merge(configuration.plain(Settings()), scenario.settings)
     settings = configuration.check(configuration.change(default, config))
@@ -176,15 +189,19 @@ def settings_for_kernel(scenario: Scenario, config: Mapping[str, Any]) -> Settin
 
 
 def changed_settings(config: Any, settings: Settings, templates: Sequence[Settings]) -> tuple[Settings, list[Settings]]:
-    """Settings of all environments and of each, changed by a dict, or those of each by one entry of a list.
+    """Apply changes to the settings of all environments, or separate changes to those of each environment.
 
     Args:
-        config: a dict, or a list of one for each.
-        settings: of all so far.
-        templates: of each so far.
+        config: changes for all environments, a dict; or a list with one dict for each environment.
+        settings: present common settings.
+        templates: present settings of each environment.
+
+    Returns:
+        The changed common settings, and the changed settings of each environment. A list leaves the common settings
+        unchanged.
 
     Raises:
-        ValueError: for a wrong setting, or one that would differ where all environments share it.
+        ValueError: for a wrong setting, or different values of a setting that all environments share.
     """
     n = len(templates)
     if isinstance(config, Mapping):
@@ -218,32 +235,35 @@ def changed_settings(config: Any, settings: Settings, templates: Sequence[Settin
 
 
 def check_same_shape(settings: Settings, present: Settings) -> None:
-    """Raise ValueError if settings change what environments in the middle of an episode share.
+    """Check that new settings keep what running environments share.
 
     Args:
-        settings: new ones.
-        present: those of the episodes under way.
+        settings: new settings.
+        present: settings of the running episodes.
+
+    Raises:
+        ValueError: if a shared setting or the number of vehicles differs.
     """
     for name in ONE_FOR_ALL:
         if getattr(settings, name) != getattr(present, name):
             raise ValueError(
-                f"config[{name!r}] = {getattr(settings, name)!r} is shared by all environments, some of which are "
+                f"config[{name!r}] = {getattr(settings, name)!r} is shared by all environments, and some of them are "
                 "in the middle of an episode; change it by reset(options={'config': ...})"
             )
     if len(settings.vehicles) != len(present.vehicles):
         raise ValueError(
-            f"config['vehicles'] has {len(settings.vehicles)} entries, and {len(present.vehicles)} now; "
-            "their number is changed by reset(options={'config': ...})"
+            f"config['vehicles'] has {len(settings.vehicles)} entries, but {len(present.vehicles)} at present; "
+            "change their number by reset(options={'config': ...})"
         )
 
 
 def _merged(settings: Settings, changes: Mapping[str, Any]) -> Settings:
-    """Settings with some changes, checked."""
+    """Settings with changes, after the check."""
     return configuration.check(configuration.change(configuration.plain(settings), changes))
 
 
 def _check_for_kernel(settings: Settings) -> None:
-    """Raise ValueError for settings that the single environment alone has."""
+    """Raise ValueError for settings that only the single environment supports."""
     if settings.other_vehicles_type != OWN_TRAFFIC:
         raise ValueError(
             f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} is not in the kernel; allowed is "
@@ -253,14 +273,14 @@ def _check_for_kernel(settings: Settings) -> None:
         if entry.setting in ONE_FOR_ALL:
             raise ValueError(
                 f"config['randomise'][{i}]['setting'] = {entry.setting!r} is shared by all environments of the kernel, "
-                "so that it cannot be drawn; use gym.make_vec(..., vectorization_mode='sync')"
+                "so it cannot be drawn; use gym.make_vec(..., vectorization_mode='sync')"
             )
     if len(settings.vehicles) > MAX_HOLES:
         raise ValueError(f"config['vehicles'] has {len(settings.vehicles)} entries; the kernel takes 0 to {MAX_HOLES}")
 
 
 def _numbers(value: Any) -> np.ndarray | None:
-    """A new array of real numbers, None where the value is something else."""
+    """A new array of real numbers; None if the value is not numeric."""
     try:
         array = np.asarray(as_array(value))
     except ValueError:  # rows of different lengths

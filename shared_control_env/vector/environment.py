@@ -1,4 +1,4 @@
-"""Many environments behind Gymnasium's vector interface, stepped by one compiled kernel."""
+"""The vectorised environment: many environments behind Gymnasium's vector interface, stepped by one compiled kernel."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ from shared_control_env.vector.pictures import Pictures
 from shared_control_env.vector.threads import Threads
 
 AT_ONCE = 100_000
-"""Environment steps of a rollout between two looks at whether it is interrupted: less than a second of one core."""
+"""Environment steps of a rollout between two checks for an interrupt; they take less than a second on one core."""
 
 FEWEST_PER_THREAD = 32
-"""Environments under which another thread costs more than it saves."""
+"""Smallest number of environments per thread; with fewer, a further thread costs more time than it saves."""
 
 
 class Rollout(NamedTuple):
-    """Rewards and ends of a rollout.
+    """Rewards and ends of episodes in a rollout.
 
     Attributes:
-        rewards: shape (steps, N).
-        ends: whether an episode ended, shape (steps, N).
+        rewards: reward of each step, shape (steps, N).
+        ends: whether an episode ended in the step, shape (steps, N).
     """
 
     rewards: np.ndarray
@@ -71,27 +71,27 @@ class Rollout(NamedTuple):
 
 
 class SharedControlVectorEnv(VectorEnv):
-    """N environments of one scenario and configuration in one kernel.
+    """N environments of one scenario in one kernel.
 
-    Environment i gives what the single environment gives for the same actions; the functions are the same.
+    For the same actions, environment i returns the same values as the single environment, because both call the same
+    compiled functions. The action space is the Box of the open slot, a Dict of both slots if both are open, or
+    ``Discrete(1)`` if both are bound.
 
     Args:
         scenario: the scenario.
-        num_envs: N.
-        config: changes to the scenario's settings.
-        render_mode: ``rgb_array`` for a picture of every environment, or ``human`` for a window with environment 0;
-            drawn by the single environment's viewer, one after the other.
-        limiter: bind alpha_a with the fuzzy inference, or with another allocator that has a ``compiled`` form; False
-            leaves it open, as the action's slot ``authority``.
-        driver: bind the driver's command with the paper's predictive driver, solved by an active-set method in
-            the kernel; else it is the action's slot ``driver``.
+        num_envs: number of environments N.
+        config: changes to the settings of the scenario.
+        render_mode: ``rgb_array`` for a picture of every environment, ``human`` for a window with environment 0, or
+            None. The viewer of the single environment draws the pictures one after the other.
+        limiter: True binds alpha_a to the fuzzy inference; an allocator with a ``compiled`` form binds it to that
+            allocator; False leaves alpha_a open as the slot ``authority`` of the action.
+        driver: True binds the driver's command to the paper's predictive driver, solved by an active-set method in
+            the kernel; False leaves the command open as the slot ``driver`` of the action.
         autoreset_mode: Gymnasium's mode or its name, such as ``same_step``.
-        threads: how many; by default one a core, and fewer for few environments.
+        threads: number of threads; None for one per core, or fewer for few environments.
 
     Raises:
-        ValueError: for wrong settings, or traffic that the kernel does not know.
-
-    The action is the open slot's Box, a dict of both, or ``Discrete(1)`` where both are bound.
+        ValueError: for wrong settings, or settings that the kernel does not support.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
@@ -143,7 +143,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._adopt(settings, [settings] * n)
 
     def _define_spaces(self) -> None:
-        """Spaces of the open slots, once."""
+        """Define the spaces once, from the open slots and the observation type."""
         bound = {DRIVER: self._driver, AUTHORITY: self._allocate is not None}
         self._open = OpenSlots(self.num_envs, tuple(slot for slot in SLOT_SPACES if not bound[slot]))
         self.single_action_space = space_of(self._open.slots)
@@ -152,7 +152,7 @@ class SharedControlVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def _adopt(self, settings: Settings, templates: list[Settings]) -> None:
-        """Take on settings, all and those of each environment; nothing has begun then."""
+        """Adopt common settings and those of each environment. All environments need a reset afterwards."""
         n = self.num_envs
         self._settings, self._templates = settings, templates
         self._started = False
@@ -175,11 +175,11 @@ class SharedControlVectorEnv(VectorEnv):
         self._batch = empty_batch(n, sizes, self._driver)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what belongs to this process: where the compiled functions are in its memory."""
+        """State for pickling, without the function addresses, which are valid only in this process."""
         return {**self.__dict__, "_calls": NOT_LOADED, "_setup": self._setup._replace(calls=NOT_LOADED)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Go on where the pickled or copied one was."""
+        """Restore pickled or copied environments, with the function addresses of this process."""
         self.__dict__.update(state)
         refresh_addresses(self._episodes, self._batch)
         refresh_addresses(self._episodes[: len(self._setup.starts.parameters)], self._setup.starts)
@@ -188,37 +188,37 @@ class SharedControlVectorEnv(VectorEnv):
 
     @property
     def threads(self) -> int:
-        """How many threads there are."""
+        """Number of threads."""
         return self._threads.count
 
     @property
     def config(self) -> dict[str, Any]:
-        """The settings of all environments, without what a list of :meth:`reset` changed in some; read only."""
+        """The common settings, without changes to single environments from a list in :meth:`reset`; read only."""
         return configuration.ReadOnly(configuration.plain(self._settings))
 
     @property
     def scenes(self) -> np.ndarray:
-        """What the sensors of each environment give, records of :data:`records.SCENE`, shape (N,); read only."""
+        """The perceived scene of each environment, records of :data:`records.SCENE`, shape (N,); read only."""
         return _read_only(self._batch.scenes)
 
     @property
     def signals(self) -> np.ndarray:
-        """Signals planned for the present step of each environment, records of :data:`records.SIGNALS`, shape (N,)."""
+        """Signals of the present step of each environment, records of :data:`records.SIGNALS`, (N,); read only."""
         return _read_only(self._batch.signals)
 
     def views(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Scene and signals of each environment, read-only 0-d records, which stay those of the present step."""
+        """Scenes and signals as lists of read-only 0-d records, which always show the present step."""
         each = [slice(i, i + 1) for i in range(self.num_envs)]
         return [self.scenes[i].reshape(()) for i in each], [self.signals[i].reshape(()) for i in each]
 
     @property
     def episodes(self) -> tuple[Settings, ...]:
-        """Settings of the present episode of each environment, with all that is random drawn."""
+        """Settings of the present episode of each environment, with all random values drawn."""
         return tuple(self._episodes)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """Seed of each environment, a random one where none was given."""
+        """Seed of each environment; a random seed if none was given."""
         for i in range(self.num_envs):
             self._generator(i)
         return tuple(seed for seed in self._seeds if seed is not None)
@@ -230,7 +230,7 @@ class SharedControlVectorEnv(VectorEnv):
 
     @property
     def bytes_per_environment(self) -> int:
-        """Memory of one environment's state [B], without what a step returns."""
+        """Memory of the state of one environment [B], without the arrays that a step returns."""
         return sum(array.nbytes for array in self._batch) // self.num_envs
 
     def reset(
@@ -242,16 +242,18 @@ class SharedControlVectorEnv(VectorEnv):
         """Begin episodes.
 
         Args:
-            seed: of all environments: an int for seed, seed + 1, ..., or one for each.
-            options: ``{"reset_mask": mask}`` resets the environments it names alone; ``{"config": {...}}`` changes
-                the settings of all, and a list of N such dicts those of each.
+            seed: an integer gives environment i the seed ``seed + i``; a sequence gives one seed to each environment.
+            options: ``{"reset_mask": mask}`` resets only the environments in the mask, shape (N,).
+                ``{"config": {...}}`` changes the settings of all environments; a list of N such dicts changes those
+                of each environment.
 
         Returns:
-            Observations, and infos with masks as Gymnasium's.
+            Observations, shape (N, n), and infos with masks as in Gymnasium.
 
         Raises:
-            ValueError: for unknown options, a wrong mask, wrong seeds or settings, all of which change nothing. Also if
-                an episode cannot be drawn: no environment is reset then, but changed settings stay, and need a reset.
+            ValueError: for unknown options, a wrong mask, wrong seeds or wrong settings; nothing is changed then. Also
+                if an episode cannot be drawn: no environment is reset then, but changed settings are kept and a reset
+                is needed.
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_open()
@@ -275,7 +277,7 @@ class SharedControlVectorEnv(VectorEnv):
             if seeded is not None:
                 self._generators[i], self._seeds[i] = seeded
         out = self._outputs()
-        if self._started:  # Environments that the mask leaves out keep their last observation.
+        if self._started:  # Environments outside the mask keep their last observation.
             out.observations[:] = self._observations
         if self._calls == NOT_LOADED:
             self._load()
@@ -288,21 +290,21 @@ class SharedControlVectorEnv(VectorEnv):
         """Drive one time step in every environment.
 
         Args:
-            actions: batch of the action space.
+            actions: batch of actions, an element of ``action_space``.
 
         Returns:
             Observations, rewards, terminations, truncations and infos, all new arrays.
 
         Raises:
-            ValueError: for a malformed action, naming the environment's index where one is to blame; nothing has
-                moved then. Also before the first reset, for an ended environment where the mode does not reset it, and
-                if an episode cannot be drawn: before anything moves, or in the mode ``same_step`` after that, when the
-                ended environments await a reset.
+            ValueError: for a malformed action, with the index of the environment if there is one; nothing has moved
+                then. Also before the first reset, and for an ended environment if the mode does not reset it. Also if
+                an episode cannot be drawn: this is raised before anything moves, except in the mode ``same_step``,
+                where the environments have moved and the ended ones need a reset.
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_ready()
         checked = self._open.checked(actions)
-        out = self._outputs(np.empty)  # all environments move, and write all of it
+        out = self._outputs(np.empty)  # all environments move, and fill the arrays completely
         _, finals = self._drive(1, checked, out)
         self._show()
         infos = self._infos(out.infos, out.drivers, self._everyone.copy())
@@ -315,16 +317,17 @@ class SharedControlVectorEnv(VectorEnv):
     def rollout(self, steps: int) -> Rollout:
         """Drive many time steps; both slots must be bound.
 
-        Where no episode is drawn, nothing is to be seen and no episode begins in the step that another ends in, many
-        of them are taken without returning to Python in between. Where autoreset is disabled, an environment whose
-        episode ends stands still from then on.
+        Many steps run without returning to Python, unless episodes are drawn at random, pictures are rendered, or the
+        autoreset mode is ``same_step``. If autoreset is disabled, an environment stands still after the end of its
+        episode.
 
         Args:
-            steps: how many, in every environment.
+            steps: number of steps of every environment.
 
         Raises:
-            ValueError: if a slot of the action is open, steps is below 1, there was no reset, an environment has ended
-                already and the mode does not reset it, or, as for :meth:`step`, an episode cannot be drawn.
+            ValueError: if a slot of the action is open, if ``steps`` is below 1, before the first reset, if an
+                environment has ended and the mode does not reset it, or if an episode cannot be drawn, as in
+                :meth:`step`.
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_ready()
@@ -341,7 +344,7 @@ class SharedControlVectorEnv(VectorEnv):
         return Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Draw: every environment in ``rgb_array`` mode, as a tuple of frames; environment 0 in the window else.
+        """Draw all environments as a tuple of frames in ``rgb_array`` mode, or environment 0 in the window.
 
         Raises:
             ValueError: before the first reset.
@@ -357,12 +360,16 @@ class SharedControlVectorEnv(VectorEnv):
         return None if self.render_mode == "human" else tuple(frames)
 
     def _show(self) -> None:
-        """Draw what people look at all the time."""
+        """Draw the window if there is one."""
         if self.render_mode == "human":
             self.render()
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close the viewer and end the threads."""
+        """Close the viewer and end the threads.
+
+        Args:
+            kwargs: ignored; part of Gymnasium's interface.
+        """
         self._pictures.close()
         self._threads.close()
 
@@ -373,7 +380,7 @@ class SharedControlVectorEnv(VectorEnv):
             )
 
     def _check_ready(self) -> None:
-        """Raise what keeps the environments from being driven on."""
+        """Raise an error if the environments cannot take a step."""
         self._check_open()
         if not self._started:
             raise ValueError("a reset() is needed first")
@@ -382,13 +389,13 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"environment {index} has ended; reset it with options={{'reset_mask': ...}}")
 
     def set_config(self, config: dict[str, Any] | Sequence[dict[str, Any]]) -> None:
-        """Change settings of the episodes that begin from now on, as a curriculum does; those under way go on.
+        """Change settings of future episodes, for example in a curriculum. Running episodes are not affected.
 
         Args:
-            config: changes to the settings of all environments, or a list of such for each.
+            config: changes to the settings of all environments, or a list with one dict for each environment.
 
         Raises:
-            ValueError: for wrong settings, or those that all environments share and that need a :meth:`reset`.
+            ValueError: for wrong settings, or for shared settings that need a :meth:`reset`.
         """
         settings, templates = changed_settings(config, self._settings, self._templates)
         check_same_shape(settings, self._settings)
@@ -401,7 +408,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._setup = self._setup._replace(starts=empty_starts(0, sizes))
 
     def _load(self) -> None:
-        """Have all compiled that a step runs."""
+        """Load or compile all functions that a step calls."""
 
         def compile_kernel() -> None:
             self._advance(1, ~self._everyone, False, self._open.nothing, self._outputs())
@@ -410,7 +417,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._setup = self._setup._replace(calls=self._calls)
 
     def _generator(self, i: int) -> np.random.Generator:
-        """Generator of environment i, seeded at random unless it was given a seed."""
+        """Generator of environment i, seeded at random if no seed was given."""
         generator = self._generators[i]
         if generator is None:
             generator, self._seeds[i] = seeding.np_random(None)
@@ -418,26 +425,27 @@ class SharedControlVectorEnv(VectorEnv):
         return generator
 
     def _begin(self, mask: np.ndarray, out: Outputs) -> None:
-        """Begin an episode in each environment that the mask names."""
+        """Begin an episode in each environment of the mask."""
         self._draw(mask)
         self._move(1, mask, True, self._open.nothing, out)
 
     def _draw(self, mask: np.ndarray) -> None:
-        """Draw an episode for each environment that the mask names, if anything is random; all of them, or none."""
+        """Draw an episode for each environment of the mask if anything is random. If one draw fails, none counts."""
         drawn = {}
         if self._random:
             drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
         self._open.clipping.clear(mask)
-        self._batch.ended[mask] = True  # so that the kernel begins them, even if an interrupt comes between
+        self._batch.ended[mask] = True  # the kernel then begins these episodes even after an interrupt in between
         for i, episode in drawn.items():
             self._episodes[i] = episode
             write_start(start_of(episode), self._batch, i)
 
     def _drive(self, steps: int, actions: Actions, out: Outputs) -> tuple[Rollout, Outputs | None]:
-        """Steps of all environments, one where an episode is drawn or begins in the step that another ends in.
+        """Step all environments. ``steps`` must be 1 if episodes are drawn or the autoreset mode is ``same_step``.
 
         Returns:
-            Rewards and ends; what those episodes ended with that others followed in the same step, None without any.
+            Rewards and ends; and the last outputs of episodes that ended and were reset in the same step, None if there
+            are none.
         """
         next_step = self._mode is AutoresetMode.NEXT_STEP
         if next_step:
@@ -455,7 +463,7 @@ class SharedControlVectorEnv(VectorEnv):
         return result, finals
 
     def _move(self, steps: int, active: np.ndarray, anew: bool, actions: Actions, out: Outputs) -> Rollout:
-        """Advance environments, and keep what a later reset or picture needs even if an interrupt comes then."""
+        """Advance environments. What a later reset or picture needs is stored even if an interrupt occurs."""
         try:
             return self._advance(steps, active, anew, actions, out)
         finally:
@@ -463,7 +471,7 @@ class SharedControlVectorEnv(VectorEnv):
             self._pictures.note(out.infos, active, self._batch)
 
     def _advance(self, steps: int, active: np.ndarray, anew: bool, actions: Actions, out: Outputs) -> Rollout:
-        """Run :func:`kernel.advance`, in all threads at once; it lets go of Python's lock."""
+        """Run :func:`kernel.advance` in all threads at once; it releases Python's global interpreter lock."""
         rewards = np.zeros((steps, self.num_envs))
         ends = np.zeros((steps, self.num_envs), dtype=bool)
         taken = np.zeros(self._threads.count, dtype=np.int64)
@@ -494,7 +502,7 @@ class SharedControlVectorEnv(VectorEnv):
         return new_outputs(self.num_envs, self._observation.size, allocate)
 
     def _infos(self, infos: np.ndarray, drivers: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
-        """Records as Gymnasium's nested dict of arrays with their masks."""
+        """Convert records to Gymnasium's nested dict of arrays and masks."""
         values = as_batch(infos, mask, self._settings.terms)
         if self._driver:
             values["driver"], values["_driver"] = as_batch(drivers, mask), mask
@@ -502,31 +510,34 @@ class SharedControlVectorEnv(VectorEnv):
 
 
 def _compiled(limiter: Any) -> Any:
-    """What allocates alpha_a in the kernel: the fuzzy inference, an allocator's compiled form, or None for nobody."""
+    """The compiled function that allocates alpha_a in the kernel; None if alpha_a is an open slot of the action."""
     if isinstance(limiter, bool | np.bool_):
         return fuzzy_authority if limiter else None
     compiled = getattr(limiter, "compiled", None)
     if not callable(compiled):
         raise ValueError(
             f"limiter = {limiter!r} must be True, False, or an allocator with a function ``compiled``, which the "
-            "kernel can run; one in Python goes into AuthorityLimiter on the single environment, or acts through "
-            "limiter=False"
+            "kernel can run; use an allocator in Python with AuthorityLimiter on the single environment, or pass its "
+            "authorities as actions with limiter=False"
         )
     ALLOCATE.address(compiled)
     return compiled
 
 
 def _read_only(array: np.ndarray) -> np.ndarray:
-    """A view that cannot be written to."""
+    """A read-only view of an array."""
     view = array.view()
     view.flags.writeable = False
     return view
 
 
 class Vectorised:
-    """What ``gym.make_vec`` calls for one scenario: N of its environments; see :class:`SharedControlVectorEnv`.
+    """Entry point of ``gym.make_vec`` for one scenario; see :class:`SharedControlVectorEnv`.
 
     Args:
+        scenario: the scenario.
+
+    Attributes:
         scenario: the scenario.
     """
 
@@ -534,10 +545,15 @@ class Vectorised:
         self.scenario = scenario
 
     def __call__(self, num_envs: int = 1, **options: Any) -> SharedControlVectorEnv:
-        """N environments of the scenario.
+        """Make N environments of the scenario.
+
+        Args:
+            num_envs: number of environments N.
+            options: further arguments of :class:`SharedControlVectorEnv`.
 
         Raises:
-            ValueError: for another automation, which the kernel does not know; or as :class:`SharedControlVectorEnv`.
+            ValueError: for a user-defined automation, which the kernel cannot run; or as for
+                :class:`SharedControlVectorEnv`.
         """
         if options.pop("automation", None) is not None:
             raise ValueError(
@@ -547,7 +563,7 @@ class Vectorised:
 
 
 def __getattr__(name: str) -> Vectorised:
-    """The entry point of a scenario, by its key in :data:`scenarios.SCENARIOS`."""
+    """The entry point of a scenario, found by its key in :data:`scenarios.SCENARIOS`."""
     if name not in SCENARIOS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return Vectorised(SCENARIOS[name])

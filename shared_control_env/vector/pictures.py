@@ -1,4 +1,4 @@
-"""Pictures of environments in the kernel, drawn by a single environment that is put into the place of each."""
+"""Pictures of the environments in the kernel. A single environment takes over the situation of each and draws it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from shared_control_env.envs.settings import Settings, plain
 
 
 class Pictures:
-    """Who draws, and what a picture shows beside the batch: paths, and what was noted of the last step.
+    """The drawing environment, and the data of a picture that the batch does not hold: paths and last infos.
 
     Args:
         render_mode: ``rgb_array``, ``human`` or None.
-        num_envs: of how many environments.
+        num_envs: number of environments N.
 
     Attributes:
-        drawn: how many environments are drawn: all, the first one in a window, or none.
+        drawn: number of environments that are drawn: all, one in a window, or none.
     """
 
     def __init__(self, render_mode: str | None, num_envs: int) -> None:
@@ -32,21 +32,21 @@ class Pictures:
         self._shown: Settings | None = None
 
     def restart(self, steps: int) -> None:
-        """Begin with other settings.
+        """Prepare for new settings.
 
         Args:
-            steps: length of an episode.
+            steps: length of an episode as a number of decisions.
         """
         self.close()
         self._paths = np.zeros((self.drawn, steps + 1, 2))
 
     def note(self, infos: np.ndarray, active: np.ndarray, batch: Batch) -> None:
-        """Keep what a later picture needs of a step.
+        """Store what a later picture needs from a step.
 
         Args:
-            infos: of the step, shape (N,).
-            active: which environments took it, shape (N,).
-            batch: after it.
+            infos: infos of the step, records of :data:`info.INFO`, shape (N,).
+            active: mask of the environments that took the step, shape (N,).
+            batch: state of all environments after the step.
         """
         if self.drawn:
             self._noted = infos.copy() if active.all() else np.where(active, infos, self._noted)
@@ -54,12 +54,15 @@ class Pictures:
             self._paths[seen, batch.scenes["k"][seen]] = batch.states[seen, :2]
 
     def draw(self, i: int, episode: Settings, batch: Batch) -> Any:
-        """A picture of one environment.
+        """Draw one environment.
 
         Args:
-            i: which.
-            episode: its settings.
-            batch: state of all.
+            i: index of the environment.
+            episode: settings of its episode.
+            batch: state of all environments.
+
+        Returns:
+            A frame in ``rgb_array`` mode, None in ``human`` mode.
         """
         if self._viewer_env is None:
             make: Any = load_env_creator("shared_control_env.envs.shared_control:SharedControlEnv")
@@ -74,11 +77,11 @@ class Pictures:
         return self._viewer_env.render()
 
     def close(self) -> None:
-        """Close the window."""
+        """Close the drawing environment and its window."""
         if self._viewer_env is not None:
             self._viewer_env.close()
             self._viewer_env = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the viewer, which belongs to this process."""
+        """State for pickling, without the drawing environment, which belongs to this process."""
         return {**self.__dict__, "_viewer_env": None}

@@ -1,4 +1,4 @@
-"""Threads that do one piece of work after the other together."""
+"""A pool of threads that run one task at a time together."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ from typing import Any
 
 
 class Threads:
-    """A number of threads, the calling one among them.
+    """A pool of threads that includes the calling thread.
 
-    Copies, and a forked process, have threads of their own.
+    A copy and a forked process get their own threads.
 
     Args:
-        count: how many, at least 1.
+        count: number of threads, at least 1.
+
+    Attributes:
+        count: number of threads.
     """
 
     def __init__(self, count: int) -> None:
@@ -26,18 +29,21 @@ class Threads:
         self._process = os.getpid()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Only how many there are: threads stay in their process."""
+        """State for pickling: only the number of threads, because threads belong to their process."""
         return {"count": self.count}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Start as many."""
+        """Start the same number of threads."""
         self.__init__(**state)  # type: ignore[misc]
 
     def run(self, work: Callable[[int], None]) -> None:
-        """Call ``work(i)`` in every thread i, the calling one being 0, and return when all are done.
+        """Call ``work(i)`` in every thread i, and return when all calls are done. The calling thread has the index 0.
+
+        Args:
+            work: function of the index of the thread.
 
         Raises:
-            BaseException: what one of the calls has raised, or an interrupt, once no thread is at work any more.
+            BaseException: the exception of one of the calls, or an interrupt, after all threads have finished.
         """
         if self._process != os.getpid():
             self._open()
@@ -58,7 +64,7 @@ class Threads:
 
 
 def _await_all(futures: Sequence[Future[None]]) -> None:
-    """Wait until all are done, interrupts notwithstanding: threads left running would race with what comes next."""
+    """Wait until all are done, even if interrupted, because threads left running would race with the next task."""
     interrupt: KeyboardInterrupt | None = None
     while not all(future.done() for future in futures):
         try:

@@ -69,10 +69,35 @@ def test_refused():
         StableBaselinesVecEnv(gym.make_vec(TWO_LANE, num_envs=2))
     with pytest.raises(ValueError, match="SharedControlVectorEnv"):
         StableBaselinesVecEnv(gym.make_vec("CartPole-v1", num_envs=2, vectorization_mode="sync"))
-    with pytest.raises(ValueError, match="nothing is wrapped around"):
-        StableBaselinesVecEnv(gym.vector.VectorWrapper(bare()))
     with pytest.raises(ValueError, match="config"):
         make().set_attr("config", {})
+
+
+def test_gymnasiums_vector_wrappers_go_before_it():
+    wrapped = gym.wrappers.vector.RecordEpisodeStatistics(gym.wrappers.vector.ClipReward(bare(), -0.5, 0.5))
+    env, plain = StableBaselinesVecEnv(wrapped), make()
+    for each in (env, plain):
+        each.seed(0)
+        each.reset()
+    returns, lengths, ended = np.zeros(env.num_envs), np.zeros(env.num_envs, dtype=int), 0
+    rng = np.random.default_rng(0)
+    for _ in range(400):
+        actions = rng.uniform(-0.5, 0.5, (env.num_envs, 2)).astype(np.float32)
+        observations, rewards, dones, infos = env.step(actions)
+        bare_observations, bare_rewards, *_ = plain.step(actions)
+        np.testing.assert_array_equal(observations, bare_observations)
+        np.testing.assert_array_equal(rewards, bare_rewards.clip(-0.5, 0.5))
+        returns, lengths = returns + rewards, lengths + 1
+        for i in np.flatnonzero(dones):
+            ended += 1
+            assert infos[i]["episode"]["l"] == lengths[i]
+            assert infos[i]["episode"]["r"] == pytest.approx(returns[i], rel=1e-4)
+            assert infos[i]["terminal_observation"].shape == observations[i].shape
+        returns[dones], lengths[dones] = 0.0, 0
+    assert ended > 3
+    env.set_options({"config": {"ego": {"speed": 9.0}}})
+    env.reset()
+    assert (env.signals["state"][:, 3] == 9.0).all()
 
 
 def test_options_change_the_settings():

@@ -20,7 +20,7 @@ class HighwayEnv(AbstractEnv):
 
     @property
     def vehicle(self) -> Any:
-        """The ego vehicle; None before the first reset."""
+        """The ego vehicle; None while there is none."""
         return self.controlled_vehicles[0] if self.controlled_vehicles else None
 
     @vehicle.setter
@@ -70,7 +70,7 @@ class HighwayEnv(AbstractEnv):
         """A copy of the environment in which vehicles of highway-env's IDMVehicle prefer a lane.
 
         Args:
-            preferred_lane: index of the lane; None for no preference.
+            preferred_lane: index of the lane; None to change nothing.
 
         Raises:
             ValueError: if there is no such vehicle.
@@ -117,7 +117,7 @@ class HighwayEnv(AbstractEnv):
         return super().set_vehicle_field(args)
 
     def call_vehicle_method(self, args: tuple[str, tuple[object]]) -> AbstractEnv:
-        """A copy of the environment in which each other vehicle is replaced by the result of one of its methods.
+        """A copy of the environment in which each vehicle with a method is replaced by the result of that method.
 
         Args:
             args: name of the method, and its arguments.

@@ -1,4 +1,4 @@
-"""Settings of an environment: their schema, changes to them, their check, and what the core takes of them."""
+"""Settings of an environment: their schema, changes to them, their check, and their conversion for the core."""
 
 from shared_control_env.envs.settings.changes import ReadOnly, as_plain, change, difference, merge
 from shared_control_env.envs.settings.checks import CUT_OFF, LEAD_IN, assigned, check

@@ -1,4 +1,4 @@
-"""Changes to settings: merged deeply, in plain types, and with the draws taken away that they would be lost to."""
+"""Changes to settings: a deep merge in plain types that also removes random draws of the changed settings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from shared_control_env.nearest import hint
 
 
 def as_plain(value: Any) -> Any:
-    """A value of a configuration in Python's own types: mappings, tuples, numbers and arrays of NumPy, tensors."""
+    """Convert a value of a configuration to built-in Python types.
+
+    Args:
+        value: mapping, sequence, NumPy number or array, tensor, or any other value, which is kept.
+    """
     if isinstance(value, Mapping):
         return {key: as_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -18,15 +22,18 @@ def as_plain(value: Any) -> Any:
 
 
 def merge(config: dict[str, Any], changes: Mapping[str, Any], path: str = "config") -> dict[str, Any]:
-    """Config with nested changes; lists are replaced whole.
+    """Merge nested changes into a config. Lists are replaced as a whole.
 
     Args:
         config: settings as a plain dict.
-        changes: what differs; None for a section that may be absent takes it away.
-        path: of the settings, for messages.
+        changes: nested dict of changes; None removes an optional section.
+        path: path of the settings for error messages.
+
+    Returns:
+        The merged settings, a new dict.
 
     Raises:
-        ValueError: for an unknown key, naming it and the nearest valid one.
+        ValueError: for an unknown key, with the nearest valid key.
     """
     if not isinstance(changes, Mapping):
         raise ValueError(f"{path} = {changes!r} must be a dict with keys among {sorted(config)}")
@@ -45,12 +52,12 @@ def merge(config: dict[str, Any], changes: Mapping[str, Any], path: str = "confi
 def named(
     changes: Mapping[str, Any], config: Mapping[str, Any], path: tuple[str, ...] = ()
 ) -> Iterator[tuple[str, ...]]:
-    """Paths of the settings that changes name: sections of settings by their fields, all else whole.
+    """Paths of the settings that the changes name. Sections are split into their fields; other values are not split.
 
     Args:
-        changes: nested dict.
-        config: the settings that they change.
-        path: of the section.
+        changes: nested dict of changes.
+        config: the settings to be changed.
+        path: path of the section that ``changes`` belongs to.
     """
     for key, value in changes.items():
         if isinstance(value, Mapping) and isinstance(config.get(key), Mapping):
@@ -62,8 +69,12 @@ def named(
 def at(config: Any, path: tuple[str, ...]) -> Any:
     """The setting at a path.
 
+    Args:
+        config: settings as a plain dict.
+        path: keys, and indices of lists as text.
+
     Raises:
-        ValueError: if there is none, naming the part that is wrong and the nearest valid one.
+        ValueError: if there is no such setting, with the wrong part of the path and the nearest valid key.
     """
     for key in path:
         if isinstance(config, list) and key.isdigit() and str(int(key)) == key and int(key) < len(config):
@@ -77,14 +88,18 @@ def at(config: Any, path: tuple[str, ...]) -> Any:
 
 
 def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
-    """The changes that lead from one config to another, so that ``merge(old, changes)`` is the new one.
+    """The changes from one config to another, so that ``merge(old, changes)`` equals the new config.
+
+    Args:
+        old: settings before the changes.
+        new: settings after the changes.
 
     Raises:
-        ValueError: if the new one lacks a setting.
+        ValueError: if the new config lacks a setting.
     """
     for key in old:
         if key not in new:
-            raise ValueError(f"config lacks {key!r}; a setting can be changed, not taken away")
+            raise ValueError(f"config lacks {key!r}; a setting can be changed, not removed")
     changes: dict[str, Any] = {}
     for key, value in new.items():
         before = old.get(key)
@@ -97,14 +112,17 @@ def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]
 
 
 def change(config: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Config with a user's changes: what they name is no longer drawn.
+    """Merge a user's changes into a config. Settings that the changes name are no longer drawn at random.
 
     Args:
         config: settings as a plain dict.
-        changes: nested dict.
+        changes: nested dict of changes.
+
+    Returns:
+        The changed settings, a new dict.
 
     Raises:
-        ValueError: for an unknown key; or if the changes give a setting another value and have it drawn too.
+        ValueError: for an unknown key; or if the changes set a setting to another value and also draw it.
     """
     merged = merge(config, changes)
     paths = {".".join(path): path for path in named(changes, config)}
@@ -117,13 +135,13 @@ def change(config: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
         if isinstance(setting, str) and setting in paths and at(merged, paths[setting]) != at(config, paths[setting]):
             raise ValueError(
                 f"config['randomise'][{i}] draws {setting!r}, which is set to {at(merged, paths[setting])!r} too; "
-                "leave one of the two out"
+                "remove one of the two"
             )
     return merged
 
 
 def _concerns(setting: str, paths: Mapping[str, Any]) -> bool:
-    """Whether a drawn setting is one of those named, or a part of one."""
+    """Whether a drawn setting is one of the named settings, or a part of one."""
     return any(setting == path or setting.startswith(f"{path}.") for path in paths)
 
 
@@ -132,7 +150,11 @@ def _refuse(self: Any, *arguments: Any, **more: Any) -> Any:
 
 
 class ReadOnly(dict[str, Any]):
-    """A dict of settings, and those in it, that refuses to be changed where that would be lost."""
+    """A read-only dict of settings, nested dicts and lists included. Changes would have no effect, so they raise.
+
+    Args:
+        values: settings as a plain dict.
+    """
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         super().__init__({key: _read_only(value) for key, value in values.items()})
@@ -140,18 +162,18 @@ class ReadOnly(dict[str, Any]):
     __setitem__ = __delitem__ = __ior__ = update = setdefault = pop = popitem = clear = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickles and copies are plain dicts, which are their owner's."""
+        """Pickles and copies become plain dicts, which may be changed."""
         return dict, (list(self.items()),)
 
 
 class ReadOnlyList(list[Any]):
-    """A list of such settings."""
+    """A read-only list in a :class:`ReadOnly` dict."""
 
     __setitem__ = __delitem__ = __iadd__ = __imul__ = append = extend = insert = pop = remove = clear = _refuse
     sort = reverse = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickles and copies are plain lists, which are their owner's."""
+        """Pickles and copies become plain lists, which may be changed."""
         return list, (tuple(self),)
 
 

@@ -1,4 +1,4 @@
-"""The check of settings: each by itself by the schema, then together what only makes sense together."""
+"""The check of settings: the schema checks each setting alone; this module also checks combinations of settings."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, 
 from shared_control_env.nearest import hint, nearest
 
 LEAD_IN = 50.0
-"""Straight road behind the ego's start [m]."""
+"""Length of the straight road behind the ego's start [m]."""
 
 LARGEST_OFFSET = 20.0
 """Largest offset of the perceived position [m]: several lanes."""
 
 CUT_OFF = 3.0
-"""Deviations at which log-normal draws are cut off."""
+"""Number of standard deviations at which log-normal draws are cut off [-]."""
 
 WAYS_TO_DRAW = ({"low", "high"}, {"median", "spread"}, {"choices"})
-"""What an entry of ``randomise`` gives beside its setting."""
+"""Keys that an entry of ``randomise`` has beside ``setting``: one of these sets."""
 
 NOT_DRAWN = (
     *("simulation_frequency", "policy_frequency"),
@@ -35,14 +35,20 @@ NOT_DRAWN = (
     *("offscreen_rendering", "real_time_rendering", "neighbour_vehicles_connected_lanes", "other_vehicles_type"),
     *("degradations", "randomise"),
 )
-"""Settings that are the same in all episodes of an environment."""
+"""Settings that must be the same in all episodes of an environment."""
 
 
 def check(config: Mapping[str, Any]) -> Settings:
     """Check a merged config.
 
+    Args:
+        config: all settings as a plain dict.
+
+    Returns:
+        The checked settings.
+
     Raises:
-        ValueError: naming field, value and allowed range, for the first setting that is wrong.
+        ValueError: for the first wrong setting, with its field, value and allowed range.
     """
     settings = _validated(config)
     _check_time(settings)
@@ -63,8 +69,8 @@ def _validated(config: Mapping[str, Any]) -> Settings:
 
 
 def _explain(error: ValidationError) -> str:
-    """Pydantic's first error in the words of this module."""
-    # An unknown key comes first: it may be the misspelt one that is missing.
+    """Text for the first of pydantic's errors."""
+    # An unknown key has priority: it may be the misspelt form of a key that is reported as missing.
     first = min(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
     path = "config" + "".join(f"[{key!r}]" for key in first["loc"])
     if first["type"] == "extra_forbidden":
@@ -88,20 +94,27 @@ def _explain(error: ValidationError) -> str:
 
 
 def bounds_of(metadata: Any) -> list[tuple[str, Any]]:
-    """Ends of a range, as pairs of ``gt``, ``ge``, ``lt`` or ``le`` and the number, that a field's metadata sets."""
+    """Bounds that the metadata of a field set.
+
+    Args:
+        metadata: one metadata object of a field.
+
+    Returns:
+        Pairs of ``gt``, ``ge``, ``lt`` or ``le`` and the bound.
+    """
     found = ((name, getattr(metadata, name, None)) for name in ("gt", "ge", "lt", "le"))
     return [(name, value) for name, value in found if value is not None]
 
 
 def _field(location: tuple[int | str, ...]) -> tuple[Any, list[Any]]:
-    """Type and constraints of the setting at a location; of a list's entries, what the list holds."""
+    """Type and constraints of the setting at a location; for a list, those of its entries."""
     kind: Any = Settings
     constraints: list[Any] = []
     for key in location:
         if isinstance(key, str) and isinstance(kind, type) and issubclass(kind, BaseModel):
             field = kind.model_fields[key]
             kind, constraints = field.annotation, list(field.metadata)
-        while get_args(kind):  # the first of Optional, Annotated or list
+        while get_args(kind):  # unpack the first argument of Optional, Annotated or list
             constraints += [each for each in get_args(kind)[1:] if not isinstance(each, type)]
             kind = get_args(kind)[0]
     return kind, constraints
@@ -119,7 +132,7 @@ def _check_time(settings: Settings) -> None:
 
 
 def _check_faults(settings: Settings) -> None:
-    """Sizes that their kinds allow, and nothing that a kind does not heed."""
+    """Check that fault sizes are in the range of their kind, and that no field is set that the kind ignores."""
     for i, fault in enumerate(settings.faults):
         name, kind = f"config['faults'][{i}]", KINDS[fault.kind]
         _refuse_idle(name, fault, "size", kind.unit is not None, f"{fault.kind} has none")
@@ -139,7 +152,7 @@ def _check_faults(settings: Settings) -> None:
 
 
 def _sizes(kind: Kind, fault: FaultSettings, settings: Settings) -> tuple[float, float]:
-    """Range of a fault's size: beyond its ends no command, whatever the limits, is any more degraded."""
+    """Range of a fault's size. Sizes beyond the ends would not degrade any command further, whatever its limits."""
     bound = core.LARGEST_ACCELERATION if fault.channel == "acceleration" else core.LARGEST_STEERING
     largest = {
         SHARE: 1.0,
@@ -152,14 +165,14 @@ def _sizes(kind: Kind, fault: FaultSettings, settings: Settings) -> tuple[float,
 
 
 def _refuse_idle(name: str, section: BaseModel, field: str, heeded: bool, reason: str) -> None:
-    """Raise ValueError for a field that is set to something else than its default, where nothing heeds it."""
+    """Raise ValueError if a field differs from its default although nothing uses it."""
     value = getattr(section, field)
     if not heeded and value != type(section).model_fields[field].default:
         raise ValueError(f"{name}[{field!r}] = {value!r} would not act: {reason}")
 
 
 def _check_random(settings: Settings) -> None:
-    """Paths that name a number, each once, and something within its range to draw from."""
+    """Check that each entry of ``randomise`` names a number, names it once, and draws only allowed values."""
     config = plain(settings)
     seen: dict[str, int] = {}
     for i, entry in enumerate(settings.randomise):
@@ -170,12 +183,12 @@ def _check_random(settings: Settings) -> None:
         except ValueError as error:
             raise ValueError(f"{name}['setting'] = {entry.setting!r}: {error}") from None
         if entry.setting in seen:
-            raise ValueError(f"{name} draws {entry.setting!r}, as entry {seen[entry.setting]} does; leave one out")
+            raise ValueError(f"{name} draws {entry.setting!r}, as entry {seen[entry.setting]} does; remove one of them")
         seen[entry.setting] = i
         if path[0] in NOT_DRAWN or path[-1] == "seed":
             raise ValueError(f"{name}['setting'] = {entry.setting!r} cannot be drawn")
         if isinstance(present, bool | str | list | Mapping):
-            raise ValueError(f"{name}['setting'] = {entry.setting!r} is no number, so that it cannot be drawn")
+            raise ValueError(f"{name}['setting'] = {entry.setting!r} is no number, so it cannot be drawn")
         given = entry.model_dump(exclude_none=True)
         del given["setting"]
         if set(given) not in WAYS_TO_DRAW or given.get("low", 0.0) > given.get("high", math.inf):
@@ -188,7 +201,11 @@ def _check_random(settings: Settings) -> None:
 
 
 def ends_of(entry: RandomSettings) -> tuple[float, ...]:
-    """The smallest and the largest value that a draw can give, or all of its choices."""
+    """The smallest and the largest value that can be drawn, or all choices.
+
+    Args:
+        entry: entry of ``randomise``.
+    """
     if entry.choices is not None:
         return tuple(entry.choices)
     if entry.median is not None and entry.spread is not None:
@@ -198,7 +215,13 @@ def ends_of(entry: RandomSettings) -> tuple[float, ...]:
 
 
 def assigned(config: Any, path: tuple[str, ...], value: Any) -> Any:
-    """A copy of a config with another value at a path that it has."""
+    """A copy of a config with another value at an existing path.
+
+    Args:
+        config: settings as a plain dict, or a list of settings.
+        path: keys, and indices of lists as text.
+        value: the new value.
+    """
     first, rest = path[0], path[1:]
     key: Any = int(first) if isinstance(config, list) else first
     copy = config.copy() if isinstance(config, list) else dict(config)
@@ -207,16 +230,16 @@ def assigned(config: Any, path: tuple[str, ...], value: Any) -> Any:
 
 
 def _check_road(settings: Settings) -> None:
-    """A road that does not meet itself, and whose lanes all bend."""
+    """Check that the road does not meet itself, and that no lane is on the wrong side of a curve's centre."""
     turned = sum(abs(segment.curvature) * segment.length for segment in settings.road.segments)
     if turned > 2.0 * math.pi:
         raise ValueError(
-            f"config['road']['segments'] turn by {turned:.3g} rad in all; allowed are 0 to {2 * math.pi:.4g}, "
+            f"config['road']['segments'] turn by {turned:.3g} rad in total; allowed are 0 to {2 * math.pi:.4g}, "
             "so that the road does not meet itself"
         )
     if settings.road_length > core.LONGEST_ROAD:
         raise ValueError(
-            f"config['road']['segments'] are {settings.road_length} m long in all; the largest is {core.LONGEST_ROAD} m"
+            f"config['road']['segments'] are {settings.road_length} m long in total; at most {core.LONGEST_ROAD} m"
         )
     lanes, width = settings.road.lanes, settings.road.lane_width
     leftmost, edge = settings.lane_centre(lanes - 1), 0.5 * width
@@ -229,7 +252,7 @@ def _check_road(settings: Settings) -> None:
 
 
 def _check_places(settings: Settings) -> None:
-    """Lanes that exist, and no two vehicles in one place."""
+    """Check that all lanes exist, that all vehicles are on the road, and that no two of them overlap."""
     lanes, edge = settings.road.lanes, 0.5 * settings.road.lane_width
     if abs(settings.ego.lateral_offset) > edge:
         raise ValueError(
@@ -261,7 +284,7 @@ def _check_places(settings: Settings) -> None:
 
 
 def _check_vehicle(settings: Settings) -> None:
-    """Stable at the speeds of the task; a warning where it would not be at motorway speed."""
+    """Check that the car is stable at the speeds of the task, and warn if it is unstable at motorway speed."""
     vehicle = core.VehicleParameters(**settings.vehicle.model_dump(exclude={"tyre"}))
     critical = core.critical_speed(vehicle)
     fastest = max(settings.ego.speed, settings.task.target_speed)
@@ -276,7 +299,7 @@ def _check_vehicle(settings: Settings) -> None:
 
 
 def _check_idle(settings: Settings) -> None:
-    """Nothing that is set and would not act beside the other settings."""
+    """Check that no setting is changed that would have no effect beside the other settings."""
     reason = "the tyres are linear, and know no friction"
     _refuse_idle("config['vehicle']", settings.vehicle, "mu", settings.vehicle.tyre != "linear", reason)
     repeated = [name for name, count in Counter(settings.terms).items() if count > 1]
@@ -319,7 +342,7 @@ def _check_idle(settings: Settings) -> None:
     if settings.fault_at == "planner" and law == "paper":
         raise ValueError(
             "config['fault_at'] = 'planner' does not go with config['authority']['law'] = 'paper': Eq. 10 falls back "
-            "on the command without the fault, which nobody knows then; the other laws do not need it"
+            "on the command without the fault, which is unknown in this case; the other laws do not need it"
         )
     _refuse_idle("config['authority']", settings.authority, "strict", law == "paper", f"the law is {law!r}")
     for field in ("standstill_gap", "closing_time"):

@@ -1,8 +1,7 @@
 """Settings of an environment: types, defaults, units and ranges.
 
-The sections that hold the model's parameters are made from the named tuples of
-:mod:`shared_control_env.core.parameters`, where each is documented with its source; there is no second
-list of them.
+The sections with model parameters are generated from the named tuples of :mod:`shared_control_env.core.parameters`,
+which document each parameter and its source. The parameters are not listed a second time.
 """
 
 from __future__ import annotations
@@ -28,17 +27,17 @@ from shared_control_env.core.world.tyre import TYRES
 from shared_control_env.envs.degradations import DEGRADATIONS
 
 OWN_TRAFFIC = "shared_control_env.envs.highway.vehicles.LaneFollower"
-"""Traffic that the core drives, by its plans."""
+"""Path of the vehicle class that follows its plan and is driven by the core."""
 
 LONGEST = 3600.0
-"""Longest duration that can be set [s]: an hour."""
+"""Longest duration that can be set [s]: one hour."""
 
 PANEL_HEIGHT = 192
-"""Height of the gauges' panel in pictures [px]."""
+"""Height of the panel of gauges in pictures [px]."""
 
 
 def _whole(value: Any) -> Any:
-    """A float that is a whole number as an integer."""
+    """Convert a float that is a whole number to an integer; return any other value unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
@@ -46,7 +45,7 @@ Lane = Annotated[int, Interval(ge=0, lt=core.MOST_LANES), BeforeValidator(_whole
 """Number of a lane; 0 is the rightmost."""
 
 Onset = Annotated[float, Interval(ge=0.0, le=LONGEST)]
-"""When something sets in [s]."""
+"""Time of the onset of an event [s]."""
 
 Seed = Annotated[int, Interval(ge=0, lt=2**63), BeforeValidator(_whole)]
 """Seed of noise; the core keeps it in 64 bits."""
@@ -57,11 +56,11 @@ def _count(largest: int, smallest: int = 1) -> Any:
 
 
 def name_in(table: Mapping[str, Any], *but: str) -> Any:
-    """A name of a table that others may add to.
+    """Type of a setting that holds a name from a table. The table may grow after this type is made.
 
     Args:
         table: entries by name.
-        but: names that are not allowed here.
+        but: names of the table that are not allowed here.
     """
 
     def check(name: str) -> str:
@@ -81,9 +80,9 @@ class Section(BaseModel):
 
 
 def _section(name: str, parameters: Any, *left_out: str, **more: Any) -> Any:
-    """Settings with the fields, types, ranges, defaults and documentation of a named-tuple class.
+    """A settings class with the fields, types, ranges, defaults and documentation of a named-tuple class.
 
-    The class goes by the name that it is assigned to here, so that it can be pickled.
+    ``name`` must be the name that the class is assigned to in this module, so that instances can be pickled.
     """
     hints = get_type_hints(parameters, include_extras=True)
     defaults = parameters._field_defaults
@@ -294,17 +293,17 @@ class Settings(Section):
 
     @property
     def terms(self) -> tuple[str, ...]:
-        """Names of the reward's terms, in order."""
+        """Names of the reward terms, in order."""
         return (*STANDARD, *(entry.term for entry in self.reward_terms))
 
     @property
     def steps(self) -> int:
-        """Length of an episode in decisions."""
+        """Length of an episode as a number of decisions."""
         return round(self.duration * self.policy_frequency)
 
     @property
     def has_person(self) -> bool:
-        """Whether the predictive driver is a person."""
+        """Whether the predictive driver is the model of a person."""
         return self.person.active
 
     @property
@@ -313,10 +312,18 @@ class Settings(Section):
         return sum(segment.length for segment in self.road.segments)
 
     def lane_centre(self, lane: int) -> float:
-        """Lateral position of a lane's centre in the road frame [m]."""
+        """Lateral position of a lane's centre in the road frame [m].
+
+        Args:
+            lane: number of the lane; 0 is the rightmost.
+        """
         return lane * self.road.lane_width
 
 
 def plain(settings: Settings) -> dict[str, Any]:
-    """Settings as a dict of JSON's own types, which an environment's spec can store."""
+    """Settings as a dict of JSON types, which the spec of an environment can store.
+
+    Args:
+        settings: checked settings.
+    """
     return json.loads(settings.model_dump_json())

@@ -1,4 +1,4 @@
-"""Checked settings as what the compiled core takes."""
+"""Conversion of checked settings to the parameters of the compiled core."""
 
 from __future__ import annotations
 
@@ -21,7 +21,11 @@ from shared_control_env.envs.settings.schema import Settings
 
 
 def parameters_of(settings: Settings) -> core.Parameters:
-    """The core's parameters of checked settings."""
+    """Parameters of the core for checked settings.
+
+    Args:
+        settings: checked settings.
+    """
 
     def values(section: BaseModel, **more: Any) -> dict[str, Any]:
         return {**section.model_dump(), **more}
@@ -70,20 +74,20 @@ def parameters_of(settings: Settings) -> core.Parameters:
 
 
 def model_of(settings: Settings) -> core.VehicleParameters:
-    """The car as the controllers take it to be.
+    """The vehicle parameters that the controllers assume, with linear tyres.
 
     Args:
-        settings: checked.
+        settings: checked settings.
     """
     believed = settings.model.model_dump(exclude_none=True)
     return core.VehicleParameters(**{**settings.vehicle.model_dump(), "tyre": 0, **believed})
 
 
 def reward_of(settings: Settings) -> core.RewardParameters:
-    """The reward's terms, where their functions are, and what they weigh.
+    """Number, function addresses and weights of the reward terms.
 
     Args:
-        settings: checked.
+        settings: checked settings.
     """
     given = {entry.term: entry.weight for entry in settings.reward_terms}
     weights = {**settings.reward.model_dump(), **given}
@@ -94,7 +98,11 @@ def reward_of(settings: Settings) -> core.RewardParameters:
 
 
 def fault_records(settings: Settings) -> np.ndarray:
-    """Faults as records of :class:`core.DegradationParameters`, shape (n,)."""
+    """Faults as records of :class:`core.parameters.DegradationParameters`, shape (n,).
+
+    Args:
+        settings: checked settings.
+    """
     records = np.zeros(len(settings.faults), record_dtype(core.DegradationParameters))
     for i, fault in enumerate(settings.faults):
         kind = KINDS[fault.kind]
@@ -123,7 +131,11 @@ def fault_records(settings: Settings) -> np.ndarray:
 
 
 def plan_records(settings: Settings) -> np.ndarray:
-    """The other vehicles' plans as records of :class:`core.TrafficParameters`, shape (n,)."""
+    """Plans of the other vehicles as records of :class:`core.parameters.TrafficParameters`, shape (n,).
+
+    Args:
+        settings: checked settings.
+    """
     records = np.zeros(len(settings.vehicles), record_dtype(core.TrafficParameters))
     for i, vehicle in enumerate(settings.vehicles):
         plan = core.TrafficParameters(

@@ -17,12 +17,12 @@ from shared_control_env.core.control import driver as driver_qp
 from shared_control_env.core.control.predictive_driver import PROGRAM
 from shared_control_env.core.control.qp.active_set import solve_qp
 from shared_control_env.core.feedback import observation
-from shared_control_env.core.risk import assessment
+from shared_control_env.core.risk.assessment import ASSESS
 from shared_control_env.core.risk.finding import SEARCH, TRIANGULATE
 from shared_control_env.core.world import scene as scenes
 from shared_control_env.core.world import vehicle as dynamics
 
-triangulate, search = TRIANGULATE.call, SEARCH.call
+triangulate, search, assess = TRIANGULATE.call, SEARCH.call, ASSESS.call
 
 N = 256
 """Number of environments in one loop."""
@@ -57,7 +57,8 @@ def _triangulation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.n
 @njit
 def _risk(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
-        assessment.assess(batch.scenes[i], batch.traffic[i], batch.lines[i], batch.parameters[i], batch.signals[i])
+        scene, p = batch.scenes[i], batch.parameters[i]
+        assess(setup.calls.assess, scene, batch.traffic[i], batch.lines[i], p, batch.signals[i])
 
 
 @njit
@@ -70,7 +71,7 @@ def _fuzzy(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) 
 def _dynamics(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         u = batch.signals[i].u
-        dynamics.plant_step(batch.states[i], u[0], u[1], setup.dt, batch.parameters[i].vehicle, works[0].plant)
+        dynamics.plant_step(batch.states[i], u[0], u[1], setup.dt, batch.parameters[i].vehicle, works[0].motion.plant)
 
 
 @njit

@@ -6,14 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.compile.jit import jit, jit_inlined
 from shared_control_env.core.control import automation
 from shared_control_env.core.control.qp.active_set import solve_qp
 from shared_control_env.core.faults.command import degrade
-from shared_control_env.core.risk.assessment import assess as assess_risk
+from shared_control_env.core.risk import assessment
 from shared_control_env.core.risk.corridor import new_scratch, search_triangles
 from shared_control_env.core.risk.triangulation import triangulate
 from shared_control_env.core.world.scene import holes_in_region, perceive
+
+assess_risk = jit_inlined(assessment.assess)
 
 
 @jit

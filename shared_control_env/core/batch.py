@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from shared_control_env.core.compile.jit import jit_inlined
 from shared_control_env.core.control import condensing
-from shared_control_env.core.parameters import Parameters
+from shared_control_env.core.control.predictive_driver import DRIVER_REPORT
+from shared_control_env.core.feedback.info import INFO
+from shared_control_env.core.parameters import DegradationParameters, Parameters, TrafficParameters
 from shared_control_env.core.records import (
+    AUTOMATION_MEMORY,
+    FAULT_MEMORY,
+    MEMORY,
+    PERSON_MEMORY,
+    SCENE,
+    SIGNALS,
+    TRANSITION,
     AutomationMemory,
     Memory,
     PersonMemory,
@@ -20,6 +30,7 @@ from shared_control_env.core.records import (
     record_dtype,
 )
 from shared_control_env.core.risk.finding import Finding
+from shared_control_env.core.world.motion import Motion
 
 
 class Batch(NamedTuple):
@@ -141,6 +152,8 @@ class Calls(NamedTuple):
     Attributes:
         automate: address of the automation's controller, see :data:`control.automation.AUTOMATE`.
         triangulate, search: addresses of the two steps that find the safe area, see :mod:`core.risk.finding`.
+        assess: address of the risk assessment, see :data:`risk.assessment.ASSESS`.
+        move: address of the vehicles' motion, see :data:`world.motion.MOVE`.
         drive: address of the predictive driver, see :data:`control.predictive_driver.DRIVE`.
         allocate: address of the allocator of authority, see :data:`authority.allocators.ALLOCATE`.
         observe: address of the function that writes the observation, see :data:`feedback.observation.WRITE`.
@@ -149,12 +162,14 @@ class Calls(NamedTuple):
     automate: int
     triangulate: int
     search: int
+    assess: int
+    move: int
     drive: int
     allocate: int
     observe: int
 
 
-NOT_LOADED = Calls(0, 0, 0, 0, 0, 0)
+NOT_LOADED = Calls(0, 0, 0, 0, 0, 0, 0, 0)
 """The addresses before the first reset."""
 
 
@@ -204,17 +219,85 @@ class Work:
         condensing: scratch of both predictive controllers.
         finding: scratch of the search for the safe area.
         automation_view: the scene as the automation perceives it.
-        row: the ego as a row of the traffic array.
-        plant: scratch of the vehicle's simulation step.
+        motion: scratch of the vehicles' motion.
         command: the driver's desired command ``[a, delta]`` [m/s^2, rad].
     """
 
     condensing: condensing.Workspace
     finding: Finding
     automation_view: Scene
-    row: Annotated[np.ndarray, (8,)]
-    plant: Annotated[np.ndarray, (2, 6)]
+    motion: Motion
     command: Vector2
 
 
 WORK = record_dtype(Work)
+
+
+class Sizes(NamedTuple):
+    """Capacity of the arrays that hold a start.
+
+    Attributes:
+        faults: number of degradations.
+        rows: number of rows of the reference line.
+        vehicles: number of other vehicles.
+    """
+
+    faults: int
+    rows: int
+    vehicles: int
+
+
+def empty_starts(n: int, sizes: Sizes) -> Starts:
+    """Arrays of zeros for n starts.
+
+    Args:
+        n: number of starts.
+        sizes: capacity for each start.
+    """
+    return Starts(
+        parameters=np.zeros(n, record_dtype(Parameters)),
+        states=np.zeros((n, 6)),
+        lines=np.zeros((n, sizes.rows, 6)),
+        faults=np.zeros((n, sizes.faults), record_dtype(DegradationParameters)),
+        traffic=np.zeros((n, sizes.vehicles, 8)),
+        plans=np.zeros((n, sizes.vehicles), record_dtype(TrafficParameters)),
+    )
+
+
+def empty_batch(n: int, sizes: Sizes, driver: bool = False) -> Batch:
+    """Arrays of n environments before their first episode.
+
+    Args:
+        n: number of environments.
+        sizes: capacity for their starts.
+        driver: whether the kernel runs the predictive driver.
+    """
+    return Batch(
+        **empty_starts(n, sizes)._asdict(),
+        scenes=np.zeros(n, SCENE),
+        signals=np.zeros(n, SIGNALS),
+        memories=np.zeros(n, MEMORY),
+        automations=np.zeros(n, AUTOMATION_MEMORY),
+        persons=np.zeros(n if driver else 1, PERSON_MEMORY),
+        transitions=np.zeros(n, TRANSITION),
+        fault_memories=np.zeros((n, sizes.faults), FAULT_MEMORY),
+        ended=np.zeros(n, dtype=bool),
+    )
+
+
+def new_outputs(n: int, features: int, allocate: Callable[..., np.ndarray] = np.zeros) -> Outputs:
+    """New arrays for one step of n environments.
+
+    Args:
+        n: number of environments.
+        features: number of features of an observation.
+        allocate: ``numpy.zeros``, or ``numpy.empty`` if every environment writes its entries.
+    """
+    return Outputs(
+        observations=allocate((n, features), np.float32),
+        rewards=allocate(n),
+        terminations=allocate(n, bool),
+        truncations=allocate(n, bool),
+        infos=allocate(n, INFO),
+        drivers=allocate(n, DRIVER_REPORT),
+    )

@@ -33,13 +33,13 @@ from shared_control_env.core.loop import (
     plan,
     see,
 )
-from shared_control_env.core.risk.assessment import assess
+from shared_control_env.core.risk.assessment import ASSESS
 from shared_control_env.core.risk.corridor import Scratch, search_triangles
 from shared_control_env.core.risk.finding import find_area
 from shared_control_env.core.risk.triangulation import MAX_HOLES
 from shared_control_env.core.world.scene import holes_in_region, perceive
 
-allocate, drive = ALLOCATE.call, DRIVE.call
+allocate, assess, drive = ALLOCATE.call, ASSESS.call, DRIVE.call
 
 TAKEN_AT_ONCE = 4
 """Number of environments that a thread takes at a time.
@@ -403,7 +403,7 @@ def judge(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> Non
     if not automated:
         decide_automation(see(e, works[0]), e, setup.calls, works[0])
     degrade_command(e)
-    assess(e.scene, e.traffic, e.line, e.p, e.signals)
+    assess(setup.calls.assess, e.scene, e.traffic, e.line, e.p, e.signals)
 
 
 @jit

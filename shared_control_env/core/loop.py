@@ -33,26 +33,13 @@ from shared_control_env.core.faults.command import ACTUATOR, PLANNER, degrade
 from shared_control_env.core.faults.perception import misperceive, see_as_automation
 from shared_control_env.core.feedback.reward import reward
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import (
-    BODY_LENGTH,
-    BODY_WIDTH,
-    HEADING,
-    SPEED,
-    Memory,
-    Scene,
-    Signals,
-    Transition,
-    X,
-    Y,
-)
-from shared_control_env.core.risk.assessment import assess
+from shared_control_env.core.records import Memory, Scene, Signals, Transition
+from shared_control_env.core.risk.assessment import ASSESS
 from shared_control_env.core.risk.finding import find_area
-from shared_control_env.core.world.collision import overlap
+from shared_control_env.core.world.motion import MOVE
 from shared_control_env.core.world.scene import holes_in_region, perceive
-from shared_control_env.core.world.traffic import decide_acceleration, move_along
-from shared_control_env.core.world.vehicle import plant_step
 
-automate = AUTOMATE.call
+automate, assess, move_all = AUTOMATE.call, ASSESS.call, MOVE.call
 
 
 @jit_inlined
@@ -69,7 +56,7 @@ def plan(k: int, e: Environment, calls: Calls, work: Work) -> None:
     find_safe_area(e, calls, work)
     decide_automation(see(e, work), e, calls, work)
     degrade_command(e)
-    assess(e.scene, e.traffic, e.line, e.p, e.signals)
+    assess(calls.assess, e.scene, e.traffic, e.line, e.p, e.signals)
 
 
 @jit_inlined
@@ -199,27 +186,15 @@ def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memor
 
 @jit_inlined
 def move(e: Environment, setup: Setup, work: Work) -> None:
-    """Move all vehicles through the simulation steps of one decision, and detect collisions of the ego.
+    """Move all vehicles to the next time step (:func:`core.world.motion.move`).
 
     Args:
         e: the environment; its state, traffic and transition are written.
         setup: number and duration of the simulation steps.
         work: scratch.
     """
-    u, row = e.signals.u, work.row
-    row[BODY_LENGTH], row[BODY_WIDTH] = e.p.vehicle.length, e.p.vehicle.width
-    for frame in range(setup.frames):
-        t = (e.scene.k * setup.frames + frame) * setup.dt
-        row[X], row[Y], row[SPEED] = e.state[0], e.state[1], e.state[3]
-        for j in range(e.traffic.shape[0]):
-            decide_acceleration(e.traffic[j], e.plans[j], t, row, e.traffic, e.line, e.p.task.lane_width)
-        plant_step(e.state, u[0], u[1], setup.dt, e.p.vehicle, work.plant)
-        row[X], row[Y], row[HEADING] = e.state[0], e.state[1], e.state[2]
-        for j in range(e.traffic.shape[0]):
-            move_along(e.traffic[j], e.plans[j], e.line, t, setup.dt)
-        for j in range(e.traffic.shape[0]):
-            if overlap(row, e.traffic[j]):
-                e.transition.crashed = True
+    address, k, frames, dt = setup.calls.move, e.scene.k, setup.frames, setup.dt
+    move_all(address, k, frames, dt, e.signals, e.p, e.state, e.traffic, e.plans, e.line, e.transition, work.motion)
 
 
 @jit_inlined

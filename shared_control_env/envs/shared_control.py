@@ -7,13 +7,20 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from highway_env.vehicle.graphics import VehicleGraphics
 
 from shared_control_env.controllers.automation import Automation, Planner
 from shared_control_env.controllers.driver import checked_command
 from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import kernel
-from shared_control_env.core.batch import NOT_LOADED, WORK, Setup
+from shared_control_env.core.batch import (
+    NOT_LOADED,
+    WORK,
+    Setup,
+    Sizes,
+    empty_batch,
+    empty_starts,
+    new_outputs,
+)
 from shared_control_env.core.control.predictive_driver import PROGRAM
 from shared_control_env.core.feedback.info import INFO, as_dict
 from shared_control_env.core.feedback.observation import OBSERVATIONS
@@ -22,16 +29,15 @@ from shared_control_env.core.records import HEADING, SPEED, X, Y
 from shared_control_env.core.risk.corridor import new_scratch
 from shared_control_env.core.risk.triangulation import MAX_HOLES, triangulate_any
 from shared_control_env.envs import settings as configuration
-from shared_control_env.envs.action import SlotAction
 from shared_control_env.envs.episode import draw_episode
+from shared_control_env.envs.highway.action import SlotAction
 from shared_control_env.envs.highway.inherited import HighwayEnv
+from shared_control_env.envs.highway.observation import CoreObservation
 from shared_control_env.envs.highway.road import LineRoad
 from shared_control_env.envs.highway.vehicles import EgoVehicle, LaneFollower, vehicle_class, write_row
 from shared_control_env.envs.highway.viewer import SharedControlViewer
-from shared_control_env.envs.observation import CoreObservation
-from shared_control_env.envs.outputs import new_outputs
 from shared_control_env.envs.seeds import checked_seed
-from shared_control_env.envs.starts import Sizes, empty_batch, empty_starts, refresh_addresses, start_of, write_start
+from shared_control_env.envs.starts import refresh_addresses, start_of, write_start
 
 
 class SharedControlEnv(HighwayEnv):
@@ -216,6 +222,8 @@ class SharedControlEnv(HighwayEnv):
 
     def _reset(self) -> None:
         """Draw the settings of the episode, and create road, vehicles and controllers from them."""
+        if self._calls == NOT_LOADED:  # first, since another process compiles what the rest needs too
+            self._calls = load(False, None, self._observation)
         settings = self.episode = draw_episode(self.settings, self.np_random)
         start = start_of(settings)
         self._batch = empty_batch(1, Sizes(len(start.faults), len(start.line), len(start.traffic)))
@@ -240,7 +248,6 @@ class SharedControlEnv(HighwayEnv):
         """Put the ego and the other vehicles on the road."""
         batch = self._batch
         ego = EgoVehicle(self.road, batch.states[0], self.episode.task.target_speed, self.parameters)
-        ego.color = VehicleGraphics.EGO_COLOR
         self.controlled_vehicles = [ego]
         self.road.vehicles = [ego]
         for (x, y, heading, speed), plan in zip(
@@ -277,6 +284,8 @@ class SharedControlEnv(HighwayEnv):
     def _load(self) -> None:
         """Set up the step, and load or compile all functions that it calls."""
         settings = self.episode
+        if self._calls == NOT_LOADED:
+            self._calls = load(False, None, self._observation)
         self._setup = Setup(
             starts=empty_starts(0, Sizes(0, 0, 0)),  # the batch already holds the start
             steps=settings.steps,
@@ -286,17 +295,14 @@ class SharedControlEnv(HighwayEnv):
             scales=self._observation.scales,
         )
         self._outputs = new_outputs(1, self._observation.size)
-        if self._calls == NOT_LOADED:
-            self._calls = load(lambda: self._run_kernel(~self._everyone), False, None, self._observation)
-            self._setup = self._setup._replace(calls=self._calls)
 
-    def _run_kernel(self, active: np.ndarray) -> None:
+    def _run_kernel(self) -> None:
         """Run one step of the kernel on the batch of size one."""
         self._taken[0] = 0
         kernel.advance(
             self._taken,
             1,
-            active,
+            self._everyone,
             True,
             self._commands,
             self._alphas,
@@ -344,7 +350,7 @@ class SharedControlEnv(HighwayEnv):
         )
         self._batch.ended[0] = resetting
         if self._given_automation is None and not self._foreign and not every_frame and len(self._corners) <= MAX_HOLES:
-            self._run_kernel(self._everyone)
+            self._run_kernel()
             if not resetting:
                 self.road.pass_frames(frames, self._setup.dt)
                 self.vehicle.crashed |= bool(self._batch.transitions["crashed"][0])

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import logger, spaces
 
 from shared_control_env.controllers.arrays import as_array
+from shared_control_env.core.feedback.observation import Observation
 
 DRIVER, AUTHORITY = "driver", "authority"
 """Names of the slots."""
@@ -37,6 +38,15 @@ def space_of(slots: tuple[str, ...]) -> spaces.Space:
     if not boxes:
         return spaces.Discrete(1)
     return spaces.Dict(boxes) if len(boxes) > 1 else boxes[slots[0]]
+
+
+def observation_space(observation: Observation) -> spaces.Box:
+    """Space of an observation: a Box of shape (n,) in [-1, 1].
+
+    Args:
+        observation: the observation type.
+    """
+    return spaces.Box(-1.0, 1.0, shape=(observation.size,), dtype=np.float32)
 
 
 SLACK = 1e-3

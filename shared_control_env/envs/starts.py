@@ -7,21 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shared_control_env.core.batch import Batch, Starts
-from shared_control_env.core.parameters import TRAFFIC_BODY, DegradationParameters, Parameters, TrafficParameters
+from shared_control_env.core.batch import Batch, Sizes, Starts, empty_starts
+from shared_control_env.core.parameters import TRAFFIC_BODY
 from shared_control_env.core.records import (
-    AUTOMATION_MEMORY,
     BODY_LENGTH,
     BODY_WIDTH,
-    FAULT_MEMORY,
-    MEMORY,
-    PERSON_MEMORY,
-    SCENE,
-    SIGNALS,
     SPEED,
-    TRANSITION,
     pack,
-    record_dtype,
 )
 from shared_control_env.core.world.road import S0, curvature_at, point_at, reference_line
 from shared_control_env.core.world.traffic import follow_lane
@@ -67,20 +59,6 @@ def start_of(settings: Settings) -> Start:
     return Start(line, fault_records(settings), pack(parameters_of(settings)), ego, traffic, plan_records(settings))
 
 
-class Sizes(NamedTuple):
-    """Capacity of the arrays that hold a start.
-
-    Attributes:
-        faults: number of degradations.
-        rows: number of rows of the reference line.
-        vehicles: number of other vehicles.
-    """
-
-    faults: int
-    rows: int
-    vehicles: int
-
-
 def sizes_for(templates: Sequence[Settings]) -> Sizes:
     """Sizes that suffice for every episode that can be drawn from the settings.
 
@@ -100,23 +78,6 @@ def _most_rows(settings: Settings) -> int:
     if any(entry.setting.startswith("road") for entry in settings.randomise):
         return 1 + len(settings.road.segments) + 4
     return len(start_of(settings).line)
-
-
-def empty_starts(n: int, sizes: Sizes) -> Starts:
-    """Arrays of zeros for n starts.
-
-    Args:
-        n: number of starts.
-        sizes: capacity for each start.
-    """
-    return Starts(
-        parameters=np.zeros(n, record_dtype(Parameters)),
-        states=np.zeros((n, 6)),
-        lines=np.zeros((n, sizes.rows, 6)),
-        faults=np.zeros((n, sizes.faults), record_dtype(DegradationParameters)),
-        traffic=np.zeros((n, sizes.vehicles, 8)),
-        plans=np.zeros((n, sizes.vehicles), record_dtype(TrafficParameters)),
-    )
 
 
 def grown(batch: Batch, sizes: Sizes) -> Batch:
@@ -157,27 +118,6 @@ def write_start(start: Start, starts: Starts | Batch, i: int) -> None:
     starts.faults[i] = np.zeros((), starts.faults.dtype)
     starts.faults[i, : len(start.faults)] = start.faults
     starts.traffic[i], starts.plans[i] = start.traffic, start.plans
-
-
-def empty_batch(n: int, sizes: Sizes, driver: bool = False) -> Batch:
-    """Arrays of n environments before their first episode.
-
-    Args:
-        n: number of environments.
-        sizes: capacity for their starts.
-        driver: whether the kernel runs the predictive driver.
-    """
-    return Batch(
-        **empty_starts(n, sizes)._asdict(),
-        scenes=np.zeros(n, SCENE),
-        signals=np.zeros(n, SIGNALS),
-        memories=np.zeros(n, MEMORY),
-        automations=np.zeros(n, AUTOMATION_MEMORY),
-        persons=np.zeros(n if driver else 1, PERSON_MEMORY),
-        transitions=np.zeros(n, TRANSITION),
-        fault_memories=np.zeros((n, sizes.faults), FAULT_MEMORY),
-        ended=np.zeros(n, dtype=bool),
-    )
 
 
 def refresh_addresses(episodes: Sequence[Settings], starts: Starts | Batch) -> None:

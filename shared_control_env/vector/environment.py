@@ -15,7 +15,15 @@ from gymnasium.vector.utils import batch_space
 from shared_control_env.controllers.allocators import Allocator
 from shared_control_env.core import kernel
 from shared_control_env.core.authority.allocators import ALLOCATE, fuzzy_authority
-from shared_control_env.core.batch import NOT_LOADED, WORK, Outputs, Setup
+from shared_control_env.core.batch import (
+    NOT_LOADED,
+    WORK,
+    Outputs,
+    Setup,
+    empty_batch,
+    empty_starts,
+    new_outputs,
+)
 from shared_control_env.core.compile.cold_start import cores
 from shared_control_env.core.compile.jit import is_interpreted
 from shared_control_env.core.control.predictive_driver import PROGRAM
@@ -24,19 +32,10 @@ from shared_control_env.core.feedback.observation import OBSERVATIONS
 from shared_control_env.core.loading import load
 from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.episode import draw_episode, is_random
-from shared_control_env.envs.outputs import new_outputs, observation_space
 from shared_control_env.envs.scenarios import SCENARIOS, Scenario
 from shared_control_env.envs.settings import Settings
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, space_of
-from shared_control_env.envs.starts import (
-    empty_batch,
-    empty_starts,
-    grown,
-    refresh_addresses,
-    sizes_for,
-    start_of,
-    write_start,
-)
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, observation_space, space_of
+from shared_control_env.envs.starts import grown, refresh_addresses, sizes_for, start_of, write_start
 from shared_control_env.vector.checks import (
     Actions,
     OpenSlots,
@@ -408,12 +407,8 @@ class SharedControlVectorEnv(VectorEnv):
         self._setup = self._setup._replace(starts=empty_starts(0, sizes))
 
     def _load(self) -> None:
-        """Load or compile all functions that a step calls."""
-
-        def compile_kernel() -> None:
-            self._advance(1, ~self._everyone, False, self._open.nothing, self._outputs())
-
-        self._calls = load(compile_kernel, self._driver, self._allocate, self._observation)
+        """Compile everything that a step runs, or read it from numba's cache."""
+        self._calls = load(self._driver, self._allocate, self._observation)
         self._setup = self._setup._replace(calls=self._calls)
 
     def _generator(self, i: int) -> np.random.Generator:

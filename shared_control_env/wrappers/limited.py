@@ -6,25 +6,29 @@ additional wrappers there.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from shared_control_env.controllers.allocators import Allocator
-from shared_control_env.controllers.automation import Planner
-from shared_control_env.envs.environments import environment_class
+from shared_control_env.core import loading
 from shared_control_env.envs.scenarios import SCENARIOS
-from shared_control_env.envs.shared_control import SharedControlEnv
-from shared_control_env.wrappers.authority_limiter import AuthorityLimiter
+
+if TYPE_CHECKING:
+    from shared_control_env.controllers.allocators import Allocator
+    from shared_control_env.controllers.automation import Planner
+    from shared_control_env.envs.shared_control import SharedControlEnv
+    from shared_control_env.wrappers.authority_limiter import AuthorityLimiter
 
 
 class Limited:
     """The callable that ``gym.make`` uses as entry point; Gymnasium reads the rendering modes from ``metadata``.
 
     Args:
-        scenario: class of the bare environment.
+        name: key of :data:`scenarios.SCENARIOS`.
     """
 
-    def __init__(self, scenario: type[SharedControlEnv]) -> None:
-        self.scenario, self.metadata = scenario, scenario.metadata
+    metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 20}
+
+    def __init__(self, name: str) -> None:
+        self.name = name
 
     def __call__(
         self,
@@ -45,7 +49,11 @@ class Limited:
         Raises:
             ValueError: for invalid settings, or for an object that is not an allocator or an automation.
         """
-        env = self.scenario(config, render_mode=render_mode)
+        loading.begin(driver=False, limiter=False)  # beside the import of highway-env
+        from shared_control_env.envs.environments import environment_class
+        from shared_control_env.wrappers.authority_limiter import AuthorityLimiter
+
+        env = environment_class(self.name)(config, render_mode=render_mode)
         if automation is not None:
             env.automation = automation
         if isinstance(limiter, bool):
@@ -57,4 +65,4 @@ def __getattr__(name: str) -> Limited:
     """The entry point of a scenario, by its key in :data:`scenarios.SCENARIOS`."""
     if name not in SCENARIOS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return Limited(environment_class(name))
+    return Limited(name)

@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 
 import shared_control_env  # noqa: F401
 from shared_control_env.core.feedback.observation import DRIVER_V0
-from shared_control_env.core.feedback.reward import TERMS
+from shared_control_env.core.feedback.reward import STANDARD as TERMS
 from shared_control_env.envs import CurveEnv, TwoLaneEnv
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel, open_slots
@@ -330,3 +330,18 @@ def test_gymnasium_step_api_after_reset_seed_of_action_space():
     env.reset(seed=0)
     env.reset()
     np.testing.assert_array_equal(env.action_space.sample(), first)
+
+
+def test_highway_env_is_imported_without_pandas_and_pyplot_which_work_all_the_same():
+    code = (
+        "import sys, gymnasium as gym, shared_control_env\n"
+        "gym.make('SharedControl/TwoLane-v0').reset(seed=0)\n"
+        "print([name for name in ('pandas', 'matplotlib.pyplot') if name in sys.modules])\n"
+        "import pandas.testing, matplotlib.pyplot as plt\n"
+        "from highway_env.envs.common import observation\n"
+        "assert observation.pd.DataFrame is pandas.DataFrame and plt.figure\n"
+        "env = gym.make('highway-v0'); env.reset(seed=0); env.step(1)\n"
+    )
+    result = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.strip() == "[]"

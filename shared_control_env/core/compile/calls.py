@@ -25,6 +25,9 @@ from shared_control_env.core.records import record_dtype
 
 PACKAGE = __name__.partition(".")[0]
 
+VECTOR = types.Array(types.float64, 1, "C")
+"""Type of an array of floats with one dimension."""
+
 MATRIX = types.Array(types.float64, 2, "C")
 """Numba's type of a two-dimensional array of double-precision floats."""
 

@@ -6,11 +6,11 @@ at a time in a process, so threads would not help.
 
 from __future__ import annotations
 
+import atexit
 import multiprocessing
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from typing import Any
 
 PATIENCE = 120.0
@@ -31,26 +31,41 @@ def has_second_core() -> bool:
     return not worker and not getattr(sys, "frozen", False) and len(cores()) > 1
 
 
-def run_beside(code: str, here: Callable[[], None]) -> None:
-    """Run Python code in another process and a function in this process at the same time, and wait for both.
+class OtherProcess:
+    """Python code in another process, which ends with this one.
 
     Args:
-        code: Python code for the other process, which uses the same module search path.
-        here: function that this process calls meanwhile; not called if no other process can be started.
+        code: source code. The other process finds the same modules as this one.
     """
-    silent: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-    try:
-        # As in multiprocessing, the other process gets the flags that this interpreter was started with, such as -I.
-        flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
-        code = f"import sys; sys.path[:] = {sys.path!r}; {code}"
-        other = subprocess.Popen([sys.executable, *flags, "-c", code], **silent)
-    except OSError:
-        return
-    try:
-        here()
-        other.wait(PATIENCE)
-    except subprocess.TimeoutExpired:
-        pass
-    finally:
-        other.kill()
-        other.wait()
+
+    def __init__(self, code: str) -> None:
+        silent: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+        self._process: Any = None
+        try:
+            # As in multiprocessing: use the flags that this Python was started with, such as -I.
+            flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
+            code = f"import sys; sys.path[:] = {sys.path!r}; {code}"
+            self._process = subprocess.Popen([sys.executable, *flags, "-c", code], **silent)
+            atexit.register(self.end)
+        except OSError:  # no more processes: this one does all the work
+            return
+
+    def __bool__(self) -> bool:
+        return self._process is not None
+
+    def wait(self) -> None:
+        """Wait until it has ended, at most :data:`PATIENCE`."""
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            self.end()
+
+    def end(self) -> None:
+        """End it if it runs."""
+        process, self._process = self._process, None
+        atexit.unregister(self.end)
+        if process is not None:
+            process.kill()
+            process.wait()

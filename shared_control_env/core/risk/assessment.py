@@ -6,6 +6,7 @@ from math import cos, sin
 
 import numpy as np
 
+from shared_control_env.core.compile.calls import MATRIX, Interface
 from shared_control_env.core.compile.jit import jit_inlined
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import (
@@ -77,7 +78,6 @@ def predict_neighbours(scene: Scene, traffic: np.ndarray, line: np.ndarray, tau:
             predicted[i, 2] = v
 
 
-@jit_inlined
 def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals) -> None:
     """Compute both risks that arise if the degraded command ``signals.u_a_f`` drives the car (Eq. 1-8).
 
@@ -100,3 +100,7 @@ def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, s
     signals.r_x = longitudinal_risk(
         s, signals.prediction[3], signals.predicted_neighbours, p.vehicle.length, scene.changing, p.longitudinal
     )
+
+
+ASSESS = Interface(None, Scene, MATRIX, MATRIX, Parameters, Signals)
+"""``assess(scene, traffic, line, p, signals)``, compiled apart from the loop."""

@@ -307,6 +307,35 @@ def implicit_step_jacobian(
 
 
 @jit
+def tyre_step(
+    z: np.ndarray,
+    heading: Direction,
+    a: float,
+    delta: float,
+    wheel: Direction,
+    h: float,
+    vehicle: VehicleParameters,
+    z_next: np.ndarray,
+) -> Direction:
+    """:func:`implicit_step` in the Cartesian frame, on the tyres that the vehicle has.
+
+    Args:
+        z: state, shape (6,).
+        heading: cosine and sine of psi.
+        a: acceleration command [m/s^2].
+        delta: front steering angle [rad].
+        wheel: cosine and sine of delta.
+        h: step [s].
+        vehicle: parameters.
+        z_next: the new state is written here, shape (6,); may be ``z`` itself.
+
+    Returns:
+        Cosine and sine of the new psi.
+    """
+    return _implicit_step(z, heading, a, delta, wheel, 0.0, h, vehicle, axles_at(z, delta, vehicle), z_next)
+
+
+@jit
 def extrapolated_step(
     z: np.ndarray, a: float, delta: float, h: float, vehicle: VehicleParameters, work: np.ndarray
 ) -> None:
@@ -325,11 +354,9 @@ def extrapolated_step(
     """
     coarse, fine = work[0], work[1]
     heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
-    axles = axles_at(z, delta, vehicle)
-    _implicit_step(z, heading, a, delta, wheel, 0.0, h, vehicle, axles, coarse)
-    heading = _implicit_step(z, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles, fine)
-    axles = axles_at(fine, delta, vehicle)
-    _implicit_step(fine, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles, fine)
+    tyre_step(z, heading, a, delta, wheel, h, vehicle, coarse)
+    heading = tyre_step(z, heading, a, delta, wheel, 0.5 * h, vehicle, fine)
+    tyre_step(fine, heading, a, delta, wheel, 0.5 * h, vehicle, fine)
     for i in range(6):
         z[i] = 2.0 * fine[i] - coarse[i]
     z[V_X] = max(0.0, z[V_X])

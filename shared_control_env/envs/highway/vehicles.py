@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from highway_env.road.lane import AbstractLane
 from highway_env.road.road import LaneIndex, Road
+from highway_env.vehicle.graphics import VehicleGraphics
 from highway_env.vehicle.kinematics import Vehicle
 
 from shared_control_env.core import entries
@@ -115,6 +116,7 @@ class EgoVehicle(ArrayVehicle):
         self.array[:] = state
         self.action = {"acceleration": 0.0, "steering": 0.0}
         self.target_speed = target_speed
+        self.color = VehicleGraphics.EGO_COLOR
         self._work = np.zeros((2, 6))
 
     @property

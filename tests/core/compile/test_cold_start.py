@@ -13,8 +13,8 @@ from shared_control_env.core.compile.jit import is_cached
 from shared_control_env.core.feedback.observation import DRIVER_V0
 
 
-def load(compile_kernel, driver=False):
-    return loading.load(compile_kernel, driver, fuzzy_authority, DRIVER_V0)
+def load(driver=False):
+    return loading.load(driver, fuzzy_authority, DRIVER_V0)
 
 
 @pytest.fixture
@@ -39,14 +39,15 @@ def cold(monkeypatch):
             noted.append(self.poll())
 
     monkeypatch.setattr(cold_start.subprocess, "Popen", Noted)
+    monkeypatch.setattr(loading, "compile_with_kernel", lambda driver: noted.append("kernel"))
     return noted
 
 
 @pytest.mark.parametrize("driver", [False, True])
 def test_the_other_process_compiles_what_the_kernel_calls(cold, driver):
-    found = load(lambda: cold.append("kernel"), driver)
+    found = load(driver)
     code, compiled, returned = cold
-    assert f"compile_others({driver})" in code
+    assert f"compile_beside_kernel({driver}, True)" in code
     assert (compiled, returned) == ("kernel", 0)
     assert all(found._replace(drive=1))
     assert bool(found.drive) is driver
@@ -69,14 +70,22 @@ def test_without_another_process_all_is_compiled_here(cold, monkeypatch, reason)
         monkeypatch.setattr(cold_start, "cores", lambda: [0])
     else:
         monkeypatch.setattr(cold_start.multiprocessing, "parent_process", lambda: "a pool")
-    assert all(load(lambda: cold.append("kernel"))._replace(drive=1))
+    assert all(load()._replace(drive=1))
     assert cold == []
 
 
 def test_a_process_that_hangs_is_not_waited_for(cold, monkeypatch):
     monkeypatch.setattr(cold_start, "PATIENCE", 0.01)
-    assert all(load(lambda: None)._replace(drive=1))
-    assert cold[1] is None  # still running when it was killed
+    assert all(load()._replace(drive=1))
+    assert cold[1:] == ["kernel", None]  # still running when it was killed
+
+
+def test_it_begins_before_what_takes_time_and_once(cold):
+    for _ in range(2):
+        loading.begin(driver=False, limiter=True)
+    assert len(cold) == 1
+    assert all(load()._replace(drive=1))
+    assert cold[1:] == ["kernel", 0]
 
 
 @pytest.mark.parametrize("make", [gym.make, gym.make_vec])

@@ -9,7 +9,7 @@ from gymnasium import spaces
 from highway_env.envs.common.observation import ObservationType
 
 from shared_control_env.core.feedback.observation import Observation
-from shared_control_env.envs.outputs import observation_space
+from shared_control_env.envs.slots import observation_space
 
 
 class CoreObservation(ObservationType):

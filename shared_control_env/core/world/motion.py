@@ -1,0 +1,87 @@
+"""Motion of all vehicles through one decision, and the ego's collisions."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numba import from_dtype, types
+
+from shared_control_env.core.compile.calls import MATRIX, VECTOR, Interface
+from shared_control_env.core.parameters import Parameters, TrafficParameters
+from shared_control_env.core.records import (
+    BODY_LENGTH,
+    BODY_WIDTH,
+    HEADING,
+    SPEED,
+    Signals,
+    Transition,
+    X,
+    Y,
+    record_dtype,
+)
+from shared_control_env.core.world.collision import overlap
+from shared_control_env.core.world.traffic import decide_acceleration, move_along
+from shared_control_env.core.world.vehicle import plant_step
+
+
+class Motion:
+    """Scratch of one environment's motion.
+
+    Attributes:
+        row: the ego as a row of the traffic array.
+        plant: scratch of the vehicle's simulation step.
+    """
+
+    row: Annotated[np.ndarray, (8,)]
+    plant: Annotated[np.ndarray, (2, 6)]
+
+
+def move(
+    k: int,
+    frames: int,
+    dt: float,
+    signals: Signals,
+    p: Parameters,
+    state: np.ndarray,
+    traffic: np.ndarray,
+    plans: np.ndarray,
+    line: np.ndarray,
+    transition: Transition,
+    work: Motion,
+) -> None:
+    """Move all vehicles through the simulation steps of one decision, and detect collisions of the ego.
+
+    Args:
+        k: time step of the decision.
+        frames: number of simulation steps.
+        dt: duration of a simulation step [s].
+        signals: record of :data:`records.SIGNALS`; its ``u`` drives the ego.
+        p: parameters.
+        state: ego ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
+        traffic: other vehicles, overwritten, shape (M, 8).
+        plans: their plans, records of :class:`core.parameters.TrafficParameters`, shape (M,).
+        line: reference line of the road, shape (n, 6).
+        transition: record of :data:`records.TRANSITION`; ``crashed`` is set on a collision.
+        work: scratch.
+    """
+    u, row = signals.u, work.row
+    row[BODY_LENGTH], row[BODY_WIDTH] = p.vehicle.length, p.vehicle.width
+    for frame in range(frames):
+        t = (k * frames + frame) * dt
+        row[X], row[Y], row[SPEED] = state[0], state[1], state[3]
+        for j in range(traffic.shape[0]):
+            decide_acceleration(traffic[j], plans[j], t, row, traffic, line, p.task.lane_width)
+        plant_step(state, u[0], u[1], dt, p.vehicle, work.plant)
+        row[X], row[Y], row[HEADING] = state[0], state[1], state[2]
+        for j in range(traffic.shape[0]):
+            move_along(traffic[j], plans[j], line, t, dt)
+        for j in range(traffic.shape[0]):
+            if overlap(row, traffic[j]):
+                transition.crashed = True
+
+
+_PLANS = types.Array(from_dtype(record_dtype(TrafficParameters)), 1, "C")
+
+MOVE = Interface(None, int, int, float, Signals, Parameters, VECTOR, MATRIX, _PLANS, MATRIX, Transition, Motion)
+"""``move(k, frames, dt, signals, p, state, traffic, plans, line, transition, work)``, compiled apart from the loop."""

@@ -5,13 +5,16 @@ BIN = $(VENV)/bin
 RLLIB = $(VENV)-rllib
 PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
-.PHONY: help install reproduce reference sensitivity policies test rllib lint types bench figures clean
+.PHONY: help install reproduce reference sensitivity policies test rllib lint types golden hooks pythons bench figures clean
 
 help:
 	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
 	@echo "make reference  run the reference benchmark and write its table and report to results/reference"
 	@echo "make sensitivity  vary what the paper leaves open, and write a table and a picture to results/sensitivity"
 	@echo "make test       lint, types and all tests"
+	@echo "make golden     golden rollouts of two environments, in seconds"
+	@echo "make hooks      have git run lint, types and golden rollouts before every commit"
+	@echo "make pythons    the tests on every promised Python that this machine has"
 	@echo "make rllib      the tests of training on Ray, in a virtual environment of their own"
 	@echo "make policies   train the policies that ship, compare them, and write them and their card to agents/policies"
 	@echo "make bench      speed, as ratios against highway-env and SciPy in the same run"
@@ -55,6 +58,15 @@ types: $(VENV)/.dev
 
 test: lint types
 	$(BIN)/python -m pytest -q -n auto $(ARGS)
+
+golden: $(VENV)/.dev
+	$(BIN)/python -m pytest -q tests/golden -k "TwoLane or LaneChange"
+
+hooks: $(VENV)/.dev
+	$(BIN)/pre-commit install
+
+pythons: $(VENV)/.dev
+	$(BIN)/nox $(ARGS)
 
 # RLlib pins an older Gymnasium, so it has an environment of its own.
 $(RLLIB)/.rllib: pyproject.toml constraints.txt

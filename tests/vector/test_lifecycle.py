@@ -101,14 +101,17 @@ def test_goes_on_in_a_forked_process():
         "import os, numpy as np, gymnasium as gym, shared_control_env\n"
         "env = gym.make_vec('SharedControl/TwoLane-v0', num_envs=4, threads=2)\n"
         "env.reset(seed=0); env.step(np.zeros((4, 2)))\n"
+        "read, write = os.pipe()\n"
         "child = os.fork()\n"
-        "x = env.step(np.zeros((4, 2)))[0].sum()\n"
+        "x = env.step(np.zeros((4, 2)))[0].tobytes()\n"
         "if child == 0:\n"
-        "    os._exit(0 if x > -1e9 else 1)\n"
-        "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))"
+        "    os.write(write, x)\n"
+        "    os._exit(0)\n"
+        "status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])\n"
+        "print(status, os.read(read, 10**6) == x)"
     )
     result = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=120)
-    assert result.stdout.strip() == "0", result.stderr
+    assert result.stdout.strip() == "0 True", result.stderr
 
 
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])

@@ -37,7 +37,7 @@ METRICS = (
     "lane_departures",
     "speed_rms",
 )
-"""Columns of the benchmark's table that are compared; less is better. ``terminated``: by either of the next two."""
+"""Columns of the benchmark's table that are compared; smaller is better. ``terminated`` combines the next two."""
 
 COMPARED = {
     "driver": ("mpc", "scripted", "none"),
@@ -87,7 +87,7 @@ def measure(
         task: key of :data:`agents.tasks.TASKS`.
         sources: the trained policies, as :func:`agents.drivers.driver_entry` takes them.
         scenarios: keys of :data:`envs.scenarios.SCENARIOS`.
-        seeds: number of seeds of each degradation, from :data:`agents.tasks.HELD_OUT_SEED` on.
+        seeds: number of seeds per scenario and degradation; the first is :data:`agents.tasks.HELD_OUT_SEED`.
         jobs: number of processes.
         progress: called with the number of finished episodes and the number of all episodes.
 
@@ -125,9 +125,9 @@ def compare(table: pd.DataFrame, task: str) -> list[Row]:
     """Every metric by kind of fault and by name, and the difference between the trained policies and the baseline.
 
     The interval of the trained policies is Student's over training seeds: each seed gives one mean, over the same
-    episodes. The intervals of the others are bootstrapped over episodes. The interval of a difference contains both
-    kinds, with the episodes in pairs. An interval does not exist with a single training seed or a single episode of
-    each scenario and degradation.
+    episodes. The intervals of the others are bootstrapped over episodes. The interval of a difference contains the
+    intervals of both kinds, for paired episodes. There is no interval if there is only one training seed, or only one
+    episode per scenario and degradation.
 
     Args:
         table: result of :func:`measure`.

@@ -149,7 +149,7 @@ def make_environment(id: str, task: str, normalisation: Normalisation, num_envs:
 
 
 def measured_normalisation(id: str, task: str, num_envs: int = 64, steps: int = 200) -> Normalisation:
-    """Mean and standard deviation of what is seen under pure exploration; the deviation is 1 for a constant entry.
+    """Mean and standard deviation of a policy's input under pure exploration; the deviation is 1 for a constant entry.
 
     The statistics are measured once. Running statistics would have to be kept equal across a cluster.
 
@@ -180,7 +180,7 @@ def make_algorithm(
     environments: int = HYPERPARAMETERS["environments"],
     steps: int = HYPERPARAMETERS["n_steps"],
 ) -> Algorithm:
-    """PPO on the Ray cluster that is connected.
+    """PPO on the connected Ray cluster.
 
     Args:
         id: id of the environment.
@@ -248,7 +248,7 @@ def export(algorithm: Algorithm, normalisation: Normalisation, card: dict[str, A
 def connect(address: str) -> None:
     """Connect to a Ray cluster, or start one on this machine.
 
-    A cluster's other machines receive the sources from here. The dependencies must be installed there.
+    The other machines of a cluster receive the sources from this one. The dependencies must be installed on them.
 
     Args:
         address: address of the cluster, ``auto``, or ``local`` for a new cluster on this machine.

@@ -100,7 +100,7 @@ def benchmark(
     jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
     engine: Annotated[str, typer.Option(help="local, or ray for a Ray cluster.")] = "local",
     out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results/benchmark"),
-    fresh: Annotated[bool, typer.Option(help="Replace results of another benchmark in that folder.")] = False,
+    fresh: Annotated[bool, typer.Option(help="Remove the results that the folder holds, and begin again.")] = False,
 ) -> None:
     """Run a suite with drivers under authorities; stopped at any moment, it goes on where it was."""
     from shared_control_env.evaluation.progress import progress_bar

@@ -18,7 +18,10 @@ from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import PERSON_MEMORY, SCENE, pack
 
 KEPT = 1000
-"""Number of programs, 2 kB each, that a predictive driver stores for its copies; then its solver is set up again."""
+"""Number of programs, 2 kB each, that a predictive driver stores; then its solver is set up again.
+
+A copy of the driver solves the stored programs again, because OSQP's workspace cannot be copied.
+"""
 
 
 @runtime_checkable
@@ -56,7 +59,7 @@ def checked_command(command: Any, who: str = "driver") -> np.ndarray:
 
     Args:
         command: anything with two numbers, ``[a, delta]`` [m/s^2, rad].
-        who: name of the driver for the error message.
+        who: source of the command, for the error message.
 
     Returns:
         Array of shape (2,).
@@ -250,10 +253,10 @@ class PersonDriver(PredictiveDriver):
             self._total = np.clip(scene["felt"] + self._arm, -self._bounds, self._bounds)  # command of the last step
             entries.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
         self._seen[()] = scene
-        if entries.take_in(scene, self._total, self.person, self._parameters, self._seen):
+        if entries.perceive_and_attend(scene, self._total, self.person, self._parameters, self._seen):
             self.solution = self.solve(self._seen)
             self._last = self.solution.command.copy()
-            entries.with_arm_noise(self._last, self.person, self._parameters)
+            entries.add_arm_noise(self._last, self.person, self._parameters)
         else:
             self._last = scene["felt"].copy()
             self.solution = Solution(self._last, True, int(osqp.SolverStatus.OSQP_SOLVED), 0, 0.0, 0.0, 0.0)
@@ -261,7 +264,7 @@ class PersonDriver(PredictiveDriver):
 
 
 def driver_of(parameters: Parameters) -> PredictiveDriver:
-    """The driver that an environment's parameters describe: a person, or the predictive driver alone.
+    """The driver that an environment's parameters describe: a person, or the plain predictive driver.
 
     Args:
         parameters: the environment's parameters.

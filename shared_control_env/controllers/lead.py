@@ -10,7 +10,7 @@ from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESE
 
 
 def lead_of(scene: np.ndarray) -> tuple[float, float]:
-    """Bumper-to-bumper gap to the vehicle ahead in the lane [m], and its speed [m/s].
+    """Bumper-to-bumper gap to the vehicle ahead in the lane [m], and the speed of that vehicle [m/s].
 
     Args:
         scene: record of :data:`core.records.SCENE`.

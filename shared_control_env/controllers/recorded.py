@@ -13,10 +13,10 @@ COLUMNS = "t,a,delta"
 
 
 class RecordedDriver:
-    """Replays recorded commands by the time of the episode, interpolated linearly and held beyond both ends.
+    """Replays recorded commands at their times in the episode, interpolated linearly and held beyond both ends.
 
-    The driver follows the clock and not the road. A recording therefore fits the episode in which it was made, or a
-    task such as a given manoeuvre.
+    The commands depend on time only, not on the road. A recording therefore suits the episode in which it was made, or
+    a task such as a prescribed manoeuvre.
 
     Args:
         samples: rows ``t, a, delta`` [s, m/s^2, rad], at least one, with increasing t, shape (T, 3).

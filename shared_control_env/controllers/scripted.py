@@ -15,8 +15,8 @@ class ScriptedDriver:
 
     ``delta = L kappa - psi - atan(k y / (v + v_0))`` at the centre of mass, with the road's curvature as feedforward
     (Hoffmann et al., Autonomous Automobile Trajectory Tracking for Off-Road Driving, ACC 2007). The acceleration is
-    proportional to the error from the target speed, which is that of a slower vehicle ahead. Behind a vehicle it is at
-    most :func:`core.world.traffic.idm_acceleration`.
+    proportional to the speed error. The target speed is that of the vehicle ahead if this vehicle is slower. Behind a
+    vehicle, the acceleration is at most :func:`core.world.traffic.idm_acceleration`.
 
     Args:
         gain: k, lateral gain [1/s].
@@ -59,13 +59,13 @@ class DistractedDriver:
     """Driver who is distracted until the displayed authority falls, and who then regains attention gradually.
 
     The hands of a distracted driver rest on the wheel and follow it: u_h,des is the automation's command that is felt
-    there. The displayed authority first falls below ``notice`` at some time. From ``reaction`` seconds after that time
-    on, awareness is ``w = 1 - exp(-t / recovery)``. The command is w times the attentive driver's command plus 1 - w
-    times the felt command.
+    there. The reaction time starts when the displayed authority first falls below ``notice``. Awareness is then
+    ``w = 1 - exp(-t / recovery)``, with t counted from the end of the reaction time. The command is w times the
+    attentive driver's command plus 1 - w times the felt command.
 
     Args:
         notice: authority below which the display attracts attention [-].
-        reaction: time from there until awareness begins to rise [s]; take-over times of 1 to 3 s are usual (Eriksson &
+        reaction: time from then until awareness begins to rise [s]; take-over times of 1 to 3 s are usual (Eriksson &
             Stanton, Takeover Time in Highly Automated Vehicles, Human Factors 2017, report 1.9 to 25.7 s).
         recovery: time constant of awareness [s].
         dt: time step [s].

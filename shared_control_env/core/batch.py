@@ -132,7 +132,7 @@ def environment(i: int, batch: Batch) -> Environment:
 class Starts(NamedTuple):
     """The fixed start of every episode.
 
-    The arrays have one entry. They are empty where episodes are drawn at random: the batch then holds the start.
+    The arrays have one entry. They are empty if episodes are drawn at random; the batch then holds each start.
 
     Attributes:
         parameters, states, lines, faults, traffic, plans: as the fields of :class:`Batch`, with N = 1 or N = 0.
@@ -269,7 +269,7 @@ def empty_batch(n: int, sizes: Sizes, driver: bool = False) -> Batch:
 
     Args:
         n: number of environments.
-        sizes: capacity for their starts.
+        sizes: capacity of the arrays for the start of each environment.
         driver: whether the kernel runs the predictive driver.
     """
     return Batch(

@@ -1,6 +1,6 @@
 """Entry points that call single core functions from Python, for controllers and vehicles that are Python objects.
 
-Numba accepts an array argument of any type in half a microsecond, but a record argument takes ten. These functions
+Numba needs half a microsecond for an array argument of any type, but ten for a record argument. These functions
 therefore take 0-d arrays and pass on the one record that each array holds, ``array[()]``.
 """
 
@@ -24,7 +24,7 @@ _automate = AUTOMATE.call
 
 
 @jit
-def drive(state: np.ndarray, a: float, delta: float, dt: float, parameters: Boxed, work: Boxed) -> None:
+def step_plant(state: np.ndarray, a: float, delta: float, dt: float, parameters: Boxed, work: Boxed) -> None:
     """Advance the plant by one step, see :func:`world.vehicle.plant_step`.
 
     Args:
@@ -50,7 +50,7 @@ def decide_acceleration(
     """Decide the acceleration of one other vehicle, see :func:`world.traffic.decide_acceleration`.
 
     Args:
-        row: the vehicle's row of the traffic array, its acceleration is written, shape (8,).
+        row: the vehicle's row of the traffic array, shape (8,); the acceleration is written.
         plan: :class:`core.parameters.TrafficParameters` of the vehicle, a 0-d array.
         t: time [s].
         ego: the ego as a row of the traffic array, shape (8,).
@@ -156,14 +156,14 @@ def clear_person(memory: Boxed, parameters: Boxed) -> None:
 
 
 @jit
-def take_in(
+def perceive_and_attend(
     scene: Boxed,
     u_last: np.ndarray,
     memory: Boxed,
     parameters: Boxed,
     seen: Boxed,
 ) -> bool:
-    """Compute what the person perceives, see :func:`control.person.take_in`.
+    """Compute what the person perceives, see :func:`control.person.perceive_and_attend`.
 
     Args:
         scene: record of :data:`records.SCENE`, a 0-d array.
@@ -175,16 +175,16 @@ def take_in(
     Returns:
         Whether the person drives.
     """
-    return person.take_in(scene[()], u_last, memory[()], parameters[()], seen[()])
+    return person.perceive_and_attend(scene[()], u_last, memory[()], parameters[()], seen[()])
 
 
 @jit
-def with_arm_noise(u_h_des: np.ndarray, memory: Boxed, parameters: Boxed) -> None:
-    """Apply the noise of the person's arm to a command, see :func:`control.person.with_arm_noise`.
+def add_arm_noise(u_h_des: np.ndarray, memory: Boxed, parameters: Boxed) -> None:
+    """Apply the noise of the person's arm to a command, see :func:`control.person.add_arm_noise`.
 
     Args:
         u_h_des: the driver's desired command [m/s^2, rad], overwritten, shape (2,).
         memory: record of :data:`records.PERSON_MEMORY`, a 0-d array.
         parameters: :class:`core.parameters.Parameters`, a 0-d array.
     """
-    person.with_arm_noise(u_h_des, memory[()], parameters[()])
+    person.add_arm_noise(u_h_des, memory[()], parameters[()])

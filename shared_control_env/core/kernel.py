@@ -149,7 +149,7 @@ def note(i: int, e: Environment, out: Outputs) -> None:
 
 
 @jit_inlined
-def conclude(i: int, resetting: bool, e: Environment, setup: Setup, out: Outputs) -> None:
+def write_outputs(i: int, resetting: bool, e: Environment, setup: Setup, out: Outputs) -> None:
     """Write the outputs of a step or of a reset: reward, end of the episode, info and observation.
 
     Args:
@@ -207,14 +207,14 @@ def advance_one(
         note(i, e, out)
         move(e, setup, work)
     plan(k, e, setup.calls, work)
-    conclude(i, resetting, e, setup, out)
+    write_outputs(i, resetting, e, setup, out)
 
 
 @jit_inlined
 def advance_through(
     i: int,
     steps: int,
-    anew: bool,
+    autoreset: bool,
     commands: np.ndarray,
     alphas: np.ndarray,
     batch: Batch,
@@ -230,7 +230,7 @@ def advance_through(
     Args:
         i: index of the environment.
         steps: number of time steps.
-        anew: whether to begin the next episode after one has ended (autoreset); if False, stop at the end.
+        autoreset: whether to begin the next episode after one has ended (autoreset); if False, stop at the end.
         commands: the driver's commands divided by their limits [-], shape (N, 2), held over the steps.
         alphas: authorities of the automation [-], shape (N, 1), held over the steps.
         batch: state of all environments; entry i is written.
@@ -243,7 +243,7 @@ def advance_through(
     """
     for k in range(steps):
         resetting = batch.ended[i]
-        if resetting and not anew:
+        if resetting and not autoreset:
             break
         advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
         rewards[k, i] = out.rewards[i]
@@ -255,7 +255,7 @@ def advance(
     taken: np.ndarray,
     steps: int,
     active: np.ndarray,
-    anew: bool,
+    autoreset: bool,
     commands: np.ndarray,
     alphas: np.ndarray,
     batch: Batch,
@@ -277,8 +277,8 @@ def advance(
         taken: number of environments of each share that threads have taken so far, shared by them, shape (threads,).
         steps: number of time steps; actions that are not bound are held over them.
         active: whether each environment is advanced, shape (N,).
-        anew: whether an environment whose episode has ended uses a step to begin the next one (autoreset); if False,
-            the environment stops.
+        autoreset: whether an environment whose episode has ended uses a step to begin the next one; if False, the
+            environment stops.
         commands: the driver's commands divided by their limits [-], shape (N, 2).
         alphas: authorities of the automation [-], shape (N, 1).
         batch: state of all environments, see :class:`batch.Batch`.
@@ -299,7 +299,9 @@ def advance(
         while first < end_at:
             for i in range(first, min(first + TAKEN_AT_ONCE, end_at)):
                 if active[i]:
-                    advance_through(i, steps, anew, commands, alphas, batch, setup, out, rewards, ends, work, program)
+                    advance_through(
+                        i, steps, autoreset, commands, alphas, batch, setup, out, rewards, ends, work, program
+                    )
             first = begin_at + fetch_add(taken, share, TAKEN_AT_ONCE)
 
 
@@ -416,4 +418,4 @@ def finish(resetting: bool, batch: Batch, setup: Setup, out: Outputs) -> None:
         setup: what all environments share.
         out: outputs of all environments; the entries of environment 0 are written.
     """
-    conclude(0, resetting, environment(0, batch), setup, out)
+    write_outputs(0, resetting, environment(0, batch), setup, out)

@@ -30,11 +30,11 @@ from shared_control_env.core.risk.finding import SEARCH, TRIANGULATE, search, tr
 from shared_control_env.core.world.motion import MOVE, move
 
 _CALLED = ((AUTOMATE, automate), (SEARCH, search), (TRIANGULATE, triangulate), (ASSESS, assess))
-"""Functions that every step calls by address, and their interfaces, those first that take longest to compile."""
+"""Functions that every step calls by address, and their interfaces; the slowest to compile come first."""
 
 
 _other: OtherProcess | None = None
-"""The process that compiles beside this one."""
+"""The process that compiles at the same time as this one."""
 
 
 def begin(driver: bool, limiter: bool) -> None:

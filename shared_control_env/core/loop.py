@@ -76,7 +76,7 @@ def find_safe_area(e: Environment, calls: Calls, work: Work) -> None:
 def see(e: Environment, work: Work) -> Scene:
     """Scene as the automation perceives it, with the errors of its perception.
 
-    The driver and the monitor use the true scene.
+    The driver and the risk assessment use the true scene; the assessment adds the errors itself if it shares them.
 
     Args:
         e: the environment; ``e.signals.misperception`` is written.

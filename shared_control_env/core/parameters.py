@@ -154,7 +154,7 @@ class LongitudinalRiskParameters(NamedTuple):
         alpha: height of the relative-speed field [-]; paper, Table V.
         A_f: height of the distance field [-]; paper, Table V.
         sigma_x: width of the distance field [m], used where ``graded`` is False; paper, Table V.
-        graded: whether sigma_x = 2 d^s instead (the text's "2 d_o", read with the distance of Eq. 8); ours.
+        graded: whether sigma_x is 2 d^s instead (the text's "2 d_o", read as the distance of Eq. 8); ours.
         b: shape of the distance field [-]; paper, Table V.
         a_max: largest deceleration of all vehicles [m/s^2]; paper, Table V.
         t_r: reaction time [s]; paper, Table V.
@@ -451,8 +451,8 @@ class AuthorityParameters(NamedTuple):
         law: index in :data:`core.authority.laws.LAWS`; paper, Eq. 10.
         operators: index in :data:`core.authority.fuzzy.OPERATORS`; ours.
         fault_at: index in :data:`core.faults.command.PLACES`, where degradations of the command act; paper: command.
-        shared: whether the monitor shares the automation's errors of perception; ours.
-        strict: whether the second line of Eq. 10 applies only for alpha < 1, as printed.
+        shared: whether the risk assessment shares the automation's errors of perception; ours.
+        strict: whether the second line of Eq. 10 applies only for alpha_a < 1, as printed.
     """
 
     law: int = 0

@@ -173,7 +173,7 @@ class SharedControlEnv(HighwayEnv):
     def automation(self) -> Planner:
         """The automation that decides u_a,des: the predictive controller of Eq. 12-13, or an assigned :class:`Planner`.
 
-        An assigned automation is kept over resets; each reset calls its ``reset()``.
+        An assigned automation is kept across resets; each reset calls its ``reset()``.
         """
         return self._automation
 
@@ -222,7 +222,7 @@ class SharedControlEnv(HighwayEnv):
 
     def _reset(self) -> None:
         """Draw the settings of the episode, and create road, vehicles and controllers from them."""
-        if self._calls == NOT_LOADED:  # first, since another process compiles what the rest needs too
+        if self._calls == NOT_LOADED:  # first, since it waits for a process that compiles what is needed below
             self._calls = load(False, None, self._observation)
         settings = self.episode = draw_episode(self.settings, self.np_random)
         start = start_of(settings)
@@ -467,7 +467,7 @@ class SharedControlEnv(HighwayEnv):
         return info
 
     def action_of(self, command: Any) -> np.ndarray:
-        """Convert a driver's command to an action, in which commands are shares of the limits.
+        """Convert a driver's command to an action, whose entries are shares of the limits.
 
         Args:
             command: ``[a, delta]`` [m/s^2, rad], shape (2,).

@@ -27,7 +27,7 @@ _BOUNDS = {name: (float(s.low[0]), float(s.high[0]), s.shape[0]) for name, s in 
 def space_of(slots: tuple[str, ...]) -> spaces.Space:
     """A new action space: a Dict for several slots, a Box for one, ``Discrete(1)`` for none.
 
-    With no slot, the only action ``0`` lets the environment run on.
+    Without an open slot, the only action is ``0``, and the environment runs by itself.
 
     Args:
         slots: names of the slots, keys of :data:`SLOT_SPACES`.
@@ -82,7 +82,7 @@ class Clipping:
                 steps[ended] = 0
 
     def note(self, slot: str, values: np.ndarray, beyond: bool) -> None:
-        """Count the values of one step that exceed their bounds, and warn if there are too many in a row.
+        """Count the steps in a row whose values exceed their bounds, and warn if there are too many.
 
         Args:
             slot: name of the slot.

@@ -80,7 +80,7 @@ def _most_rows(settings: Settings) -> int:
     return len(start_of(settings).line)
 
 
-def grown(batch: Batch, sizes: Sizes) -> Batch:
+def enlarged(batch: Batch, sizes: Sizes) -> Batch:
     """A batch with room for larger starts. The episodes that are running in it are kept.
 
     Args:

@@ -12,7 +12,7 @@ from threading import Thread
 from typing import Any
 
 from shared_control_env.evaluation.additions import additions, adopt
-from shared_control_env.evaluation.episodes import Batch, run
+from shared_control_env.evaluation.episodes import EpisodeBatch, run
 
 Rows = list[dict[str, Any]]
 
@@ -24,7 +24,7 @@ class WorkersLostError(RuntimeError):
     """Worker processes were killed or could not start."""
 
 
-def serial(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Rows]]:
+def serial(batches: Sequence[EpisodeBatch]) -> Iterator[tuple[EpisodeBatch, Rows]]:
     """Run one batch after the other in this process.
 
     Args:
@@ -37,7 +37,7 @@ def serial(batches: Sequence[Batch]) -> Iterator[tuple[Batch, Rows]]:
         yield batch, run(batch)
 
 
-def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows]]:
+def processes(batches: Sequence[EpisodeBatch], jobs: int) -> Iterator[tuple[EpisodeBatch, Rows]]:
     """Run batches in several processes, and return them in the order of completion.
 
     The worker processes end with this process, even if it is killed. The first batch with the driver in the kernel and
@@ -69,7 +69,7 @@ def processes(batches: Sequence[Batch], jobs: int) -> Iterator[tuple[Batch, Rows
                 f"jobs = {jobs}: driver {batch.driver[0]!r} or authority {batch.authority[0]!r} cannot be sent to "
                 f"another process ({error}); define it in a file, under a name, or use jobs=1"
             ) from None
-    first: dict[bool, Batch] = {}
+    first: dict[bool, EpisodeBatch] = {}
     for batch in batches:
         first.setdefault(batch.driver[1].make is None, batch)
     yield from serial(list(first.values()))
@@ -106,7 +106,7 @@ def _begin_worker(added: Mapping[str, Mapping[str, Any]]) -> None:
     _end_with_parent()
 
 
-def _run_elsewhere(added: Mapping[str, Mapping[str, Any]], batch: Batch) -> Rows:
+def _run_elsewhere(added: Mapping[str, Mapping[str, Any]], batch: EpisodeBatch) -> Rows:
     """Call :func:`episodes.run` in a process that may lack the additions."""
     adopt(added)
     return run(batch)
@@ -124,7 +124,9 @@ def _end_with_parent() -> None:
     Thread(target=watch, daemon=True).start()
 
 
-def ray_cluster(batches: Sequence[Batch], jobs: int, address: str | None = None) -> Iterator[tuple[Batch, Rows]]:
+def ray_cluster(
+    batches: Sequence[EpisodeBatch], jobs: int, address: str | None = None
+) -> Iterator[tuple[EpisodeBatch, Rows]]:
     """Run batches as tasks on a Ray cluster, and return them in the order of completion.
 
     A batch whose worker is lost is started again.

@@ -40,7 +40,7 @@ AS_GIVEN = "own"
 """Name in the table for the degradation that the scenario itself has."""
 
 
-class Batch(NamedTuple):
+class EpisodeBatch(NamedTuple):
     """Episodes that differ only in degradation and seed.
 
     Attributes:
@@ -72,7 +72,7 @@ def plan(
     seeds: Sequence[int],
     config: Mapping[str, Any],
     automation: Callable[[], Planner] | None = None,
-) -> Iterator[Batch]:
+) -> Iterator[EpisodeBatch]:
     """Divide all episodes of a suite into batches, in a fixed order.
 
     Args:
@@ -89,10 +89,10 @@ def plan(
             for authority in authorities.items():
                 for i in range(0, len(episodes), LARGEST_BATCH):
                     part = tuple(episodes[i : i + LARGEST_BATCH])
-                    yield Batch(scenario, driver, authority, part, config, automation)
+                    yield EpisodeBatch(scenario, driver, authority, part, config, automation)
 
 
-def settings_of(batch: Batch, degradation: str | None) -> dict[str, Any]:
+def settings_of(batch: EpisodeBatch, degradation: str | None) -> dict[str, Any]:
     """Changes to the scenario's settings for one episode of a batch.
 
     Args:
@@ -179,7 +179,7 @@ def versions() -> str:
     return ", ".join(["python " + python_version(), *parts, f"sources {source_digest()}"])
 
 
-def make_environment(batch: Batch, render_mode: str | None = None) -> Any:
+def make_environment(batch: EpisodeBatch, render_mode: str | None = None) -> Any:
     """Environment for the episodes of a batch. Slots are bound if their driver or allocator runs in the kernel.
 
     Args:
@@ -301,7 +301,7 @@ class Policies:
         env: environment of the batch, after its reset.
     """
 
-    def __init__(self, batch: Batch, env: Any) -> None:
+    def __init__(self, batch: EpisodeBatch, env: Any) -> None:
         self._scenes, self._signals = env.views()
         limits = env.config["limits"]
         self._limits = np.array([limits["a_max"], limits["delta_max"]])
@@ -340,7 +340,7 @@ class Policies:
         return action if len(action) != 1 else next(iter(action.values()))
 
 
-def run(batch: Batch, frames: list[np.ndarray] | None = None) -> list[dict[str, Any]]:
+def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dict[str, Any]]:
     """Run a batch.
 
     Args:

@@ -1,4 +1,4 @@
-"""Replay of one episode of the benchmark, identified by its names or by the folder of a run."""
+"""Replay of one episode of the benchmark, with entries of the catalogue or of the folder of a run."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.evaluation.additions import additions, described
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
-from shared_control_env.evaluation.episodes import Batch, run, versions
+from shared_control_env.evaluation.episodes import EpisodeBatch, run, versions
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import read_manifest
@@ -41,13 +41,13 @@ def replay_episode(
         degradation: key of :data:`envs.degradations.DEGRADATIONS`; None for the scenario's own.
         seed: seed of the episode.
         frames: list to which pictures of every step are appended; None for no pictures.
-        config: changes to the scenario's settings; those of the benchmark.
+        config: changes to the scenario's settings, as in the benchmark.
         automation: makes a user-defined automation; None for the predictive controller.
 
     Returns:
         Metrics of the episode by name.
     """
-    (row,) = run(Batch(scenario, driver, authority, ((degradation, seed),), config or {}, automation), frames)
+    (row,) = run(EpisodeBatch(scenario, driver, authority, ((degradation, seed),), config or {}, automation), frames)
     return {name: row[name] for name in METRICS}
 
 
@@ -67,7 +67,7 @@ class Entries(NamedTuple):
 
 
 def entries_of(folder: Path, driver: str, authority: str) -> Entries:
-    """Read from a results folder what an episode of the benchmark was run with.
+    """Read driver, authority, settings and automation of a benchmark's episodes from a results folder.
 
     A user's own class is imported by its path, with the working directory in the import path.
 

@@ -30,7 +30,7 @@ from shared_control_env.evaluation.catalogue import (
     chosen_drivers,
     chosen_suite,
 )
-from shared_control_env.evaluation.episodes import MOST_SEEDS, Batch, plan, settings_of, versions
+from shared_control_env.evaluation.episodes import MOST_SEEDS, EpisodeBatch, plan, settings_of, versions
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.replay import GIVEN
 from shared_control_env.evaluation.storage import MAY_GROW, REPORT, TABLE, ResultsFolder, sorted_table, write_atomically
@@ -72,7 +72,7 @@ def evaluate(
         out: folder that stores the results as they are completed; an interrupted run resumes from there. At the end
             ``episodes.parquet`` and ``report.html`` are written into it. If one of your own drivers or allocators has
             changed, its episodes are run again.
-        fresh: remove the results of another benchmark from the folder.
+        fresh: remove all earlier results from the folder.
         jobs: number of processes. They import the program that starts them, so a script must call this function under
             ``if __name__ == "__main__":``. Your own drivers must be picklable by name, so they cannot be defined in a
             notebook.
@@ -147,7 +147,7 @@ def _checked_seeds(seeds: Iterable[int]) -> list[int]:
     return list(numbers)
 
 
-def _check_settings(batches: Sequence[Batch]) -> None:
+def _check_settings(batches: Sequence[EpisodeBatch]) -> None:
     """Check the settings of all batches before the first episode runs."""
     seen = set()
     for batch in batches:
@@ -198,18 +198,18 @@ def _origin_and_fingerprint(
     return {"origin": f"{module}:{path}" if found else None, "fingerprint": told}
 
 
-def _run(batches: Sequence[Batch], jobs: int, engine: str) -> Iterator[tuple[Batch, engines.Rows]]:
+def _run(batches: Sequence[EpisodeBatch], jobs: int, engine: str) -> Iterator[tuple[EpisodeBatch, engines.Rows]]:
     if engine == "ray":
         return engines.ray_cluster(batches, jobs)
     return engines.processes(batches, jobs) if jobs > 1 else engines.serial(batches)
 
 
 def _progressing(
-    results: Iterator[tuple[Batch, engines.Rows]],
-    batches: Sequence[Batch],
+    results: Iterator[tuple[EpisodeBatch, engines.Rows]],
+    batches: Sequence[EpisodeBatch],
     done: int,
     progress: Callable[[int, int], None] | None,
-) -> Iterator[tuple[Batch, engines.Rows]]:
+) -> Iterator[tuple[EpisodeBatch, engines.Rows]]:
     """Pass the results on as they come, and report each to ``progress``."""
     report = progress or (lambda done, total: None)
     total = sum(len(batch.episodes) for batch in batches)

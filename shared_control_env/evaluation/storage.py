@@ -88,7 +88,7 @@ class ResultsFolder:
     Args:
         path: path of the folder. It is made if needed; results of the same benchmark are resumed.
         manifest: description of the benchmark: suite, seeds, config, versions, and each driver and authority by name.
-        fresh: remove the results of another benchmark; files that are not results are kept.
+        fresh: remove all earlier results from the folder; files that are not results are kept.
 
     Attributes:
         path: path of the folder.
@@ -96,8 +96,8 @@ class ResultsFolder:
         notices: messages about the state of the folder, one line each.
 
     Raises:
-        ValueError: if the folder holds other files or results, with the difference; if another run writes there; or if
-            the folder cannot be written to.
+        ValueError: if the folder holds other files; if it holds results of another benchmark (the message names the
+            difference); if another run writes there; or if the folder cannot be written to.
     """
 
     def __init__(self, path: Path, manifest: Mapping[str, Any], fresh: bool = False) -> None:
@@ -219,7 +219,7 @@ class ResultsFolder:
         self._files[key] = path
 
     def table(self) -> pd.DataFrame:
-        """All stored episodes of the present versions of drivers and authorities, in the order of their names."""
+        """All stored episodes of the present versions of drivers and authorities, sorted by :data:`IDENTITY`."""
         drivers, authorities = (
             {_digest_of(self.manifest[part], name) for name in self.manifest[part]} for part in MAY_GROW
         )

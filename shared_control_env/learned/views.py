@@ -62,7 +62,7 @@ FEATURES_OF = {"driver": DRIVER_FEATURES, "allocator": ALLOCATOR_FEATURES}
 """What a policy of each task sees."""
 
 DEAD_ZONE = 0.06
-"""Share of the limits below which the action of a driver's policy leaves wheel and pedal alone [-]."""
+"""Dead zone of a driver's policy: smaller actions, as shares of the limits, give a zero command [-]."""
 
 _OWN_SCALES = np.array([scale for _, scale in DRIVER_FEATURES[len(FEATURES) :]])
 _SCALES = np.array([scale for _, scale in ALLOCATOR_FEATURES])
@@ -73,9 +73,9 @@ def driver_view(observations: np.ndarray, felt: np.ndarray) -> np.ndarray:
 
     ::
 
-        gap             = s_p - s - 5 m, bumper to bumper; at least 0.1 m; the largest gap without a vehicle ahead
+        gap             = s_p - s - 5 m, bumper to bumper; at least 0.1 m; the observation's largest without a vehicle
         1 / TTC         = -(v_p - v) / gap
-        a that avoids   = max(0, v - v_p)^2 / (2 gap), if the vehicle ahead keeps its speed
+        deceleration    = max(0, v - v_p)^2 / (2 gap), enough if the vehicle ahead keeps its speed
 
     Args:
         observations: observations of the environment, of :data:`DRIVER_V0`, shape (..., n).
@@ -132,7 +132,7 @@ def allocator_view(scenes: np.ndarray, signals: np.ndarray) -> np.ndarray:
 
 
 def view(task: str, observations: np.ndarray, scenes: np.ndarray, signals: np.ndarray) -> np.ndarray:
-    """What a policy of a task sees.
+    """Input of a policy: :func:`driver_view` or :func:`allocator_view`, depending on the task.
 
     Args:
         task: key of :data:`agents.tasks.TASKS`.
@@ -149,7 +149,7 @@ def command(action: np.ndarray) -> np.ndarray:
     """The driver's command, divided by its limits, for a policy's action; small actions give zero.
 
     ``sign(a) max(0, |a| - d) / (1 - d)`` with the dead zone d. The output of a network is never exactly zero, and would
-    otherwise disturb a sound automation all the time.
+    otherwise disturb a healthy automation all the time.
 
     Args:
         action: action of the policy in [-1, 1], any shape.
@@ -158,7 +158,7 @@ def command(action: np.ndarray) -> np.ndarray:
 
 
 def authority(action: np.ndarray) -> np.ndarray:
-    """alpha_a in [0, 1] for an allocator's action; an untrained policy therefore begins near the middle.
+    """alpha_a in [0, 1] for an allocator's action; an untrained policy therefore begins near 0.5.
 
     Args:
         action: action of the policy in [-1, 1], any shape.

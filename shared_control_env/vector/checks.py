@@ -49,7 +49,7 @@ class OpenSlots:
 
     def __init__(self, num_envs: int, slots: tuple[str, ...]) -> None:
         self.num_envs, self.slots = num_envs, slots
-        self.nothing = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
+        self.no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self.clipping = Clipping(num_envs)
         self._bounds = {slot: (SLOT_SPACES[slot].low[0], SLOT_SPACES[slot].high[0]) for slot in slots}
 
@@ -69,7 +69,7 @@ class OpenSlots:
         given = actions if len(self.slots) == 2 else dict.fromkeys(self.slots, actions)
         if len(self.slots) == 2 and (not isinstance(actions, dict) or set(actions) != set(self.slots)):
             raise ValueError(f"actions must be a dict with the keys {sorted(self.slots)}, each of shape ({n}, n)")
-        values = {DRIVER: self.nothing.commands, AUTHORITY: self.nothing.alphas}
+        values = {DRIVER: self.no_actions.commands, AUTHORITY: self.no_actions.alphas}
         for slot in self.slots:
             size, (low, high) = SLOT_SPACES[slot].shape[0], self._bounds[slot]
             array = _numbers(given[slot])
@@ -173,7 +173,7 @@ def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 
 def settings_for_kernel(scenario: Scenario, config: Mapping[str, Any]) -> Settings:
-    """Settings of a scenario with changes, after all checks, those for the kernel included.
+    """Settings of a scenario with changes. All checks are made, including those for the kernel.
 
     Args:
         scenario: scenario that provides the defaults.
@@ -234,7 +234,7 @@ def changed_settings(config: Any, settings: Settings, templates: Sequence[Settin
     return changed, new
 
 
-def check_same_shape(settings: Settings, present: Settings) -> None:
+def check_shared_settings(settings: Settings, present: Settings) -> None:
     """Check that new settings keep what running environments share.
 
     Args:

@@ -35,12 +35,12 @@ from shared_control_env.envs.episode import draw_episode, is_random
 from shared_control_env.envs.scenarios import SCENARIOS, Scenario
 from shared_control_env.envs.settings import Settings
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, observation_space, space_of
-from shared_control_env.envs.starts import grown, refresh_addresses, sizes_for, start_of, write_start
+from shared_control_env.envs.starts import enlarged, refresh_addresses, sizes_for, start_of, write_start
 from shared_control_env.vector.checks import (
     Actions,
     OpenSlots,
     changed_settings,
-    check_same_shape,
+    check_shared_settings,
     checked_count,
     checked_generators,
     checked_mask,
@@ -338,7 +338,7 @@ class SharedControlVectorEnv(VectorEnv):
         piece = 1 if one_by_one else max(1, AT_ONCE // self.num_envs)
         taken = []
         for first in range(0, steps, piece):
-            taken.append(self._drive(min(piece, steps - first), self._open.nothing, out)[0])
+            taken.append(self._drive(min(piece, steps - first), self._open.no_actions, out)[0])
             self._show()
         return Rollout(*(np.concatenate(parts) for parts in zip(*taken, strict=True)))
 
@@ -397,13 +397,13 @@ class SharedControlVectorEnv(VectorEnv):
             ValueError: for wrong settings, or for shared settings that need a :meth:`reset`.
         """
         settings, templates = changed_settings(config, self._settings, self._templates)
-        check_same_shape(settings, self._settings)
+        check_shared_settings(settings, self._settings)
         if not self._started:
             self._adopt(settings, templates)
             return
         self._settings, self._templates, self._random = settings, templates, True
         sizes = sizes_for(templates)
-        self._batch = grown(self._batch, sizes)
+        self._batch = enlarged(self._batch, sizes)
         self._setup = self._setup._replace(starts=empty_starts(0, sizes))
 
     def _load(self) -> None:
@@ -422,10 +422,10 @@ class SharedControlVectorEnv(VectorEnv):
     def _begin(self, mask: np.ndarray, out: Outputs) -> None:
         """Begin an episode in each environment of the mask."""
         self._draw(mask)
-        self._move(1, mask, True, self._open.nothing, out)
+        self._move(1, mask, True, self._open.no_actions, out)
 
     def _draw(self, mask: np.ndarray) -> None:
-        """Draw an episode for each environment of the mask if anything is random. If one draw fails, none counts."""
+        """Draw an episode for each environment of the mask if anything is random. A failed draw changes no episode."""
         drawn = {}
         if self._random:
             drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
@@ -457,15 +457,15 @@ class SharedControlVectorEnv(VectorEnv):
             getattr(out, name)[ended] = getattr(finals, name)[ended]
         return result, finals
 
-    def _move(self, steps: int, active: np.ndarray, anew: bool, actions: Actions, out: Outputs) -> Rollout:
+    def _move(self, steps: int, active: np.ndarray, autoreset: bool, actions: Actions, out: Outputs) -> Rollout:
         """Advance environments. What a later reset or picture needs is stored even if an interrupt occurs."""
         try:
-            return self._advance(steps, active, anew, actions, out)
+            return self._advance(steps, active, autoreset, actions, out)
         finally:
             self._observations = out.observations.copy()
             self._pictures.note(out.infos, active, self._batch)
 
-    def _advance(self, steps: int, active: np.ndarray, anew: bool, actions: Actions, out: Outputs) -> Rollout:
+    def _advance(self, steps: int, active: np.ndarray, autoreset: bool, actions: Actions, out: Outputs) -> Rollout:
         """Run :func:`kernel.advance` in all threads at once; it releases Python's global interpreter lock."""
         rewards = np.zeros((steps, self.num_envs))
         ends = np.zeros((steps, self.num_envs), dtype=bool)
@@ -476,7 +476,7 @@ class SharedControlVectorEnv(VectorEnv):
                 taken,
                 steps,
                 active,
-                anew,
+                autoreset,
                 actions.commands,
                 actions.alphas,
                 self._batch,

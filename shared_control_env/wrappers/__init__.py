@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shared_control_env.wrappers.authority_limiter import AuthorityLimiter
     from shared_control_env.wrappers.driver_model import DriverModel
-    from shared_control_env.wrappers.slots import open_slots
+    from shared_control_env.wrappers.slot_wrapper import open_slots
 
 __all__ = ["AuthorityLimiter", "DriverModel", "open_slots"]
 
-_PLACES = {"AuthorityLimiter": "authority_limiter", "DriverModel": "driver_model", "open_slots": "slots"}
+_PLACES = {"AuthorityLimiter": "authority_limiter", "DriverModel": "driver_model", "open_slots": "slot_wrapper"}
 
 
 def __getattr__(name: str) -> Any:

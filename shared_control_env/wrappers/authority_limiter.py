@@ -10,7 +10,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, checked_authority
 from shared_control_env.envs.slots import AUTHORITY
-from shared_control_env.wrappers.slots import SlotWrapper, check_reset
+from shared_control_env.wrappers.slot_wrapper import SlotWrapper, check_reset
 
 
 class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):

@@ -12,7 +12,7 @@ from gymnasium.utils import RecordConstructorArgs
 from shared_control_env.controllers.driver import Driver, PersonDriver, checked_command, driver_of
 from shared_control_env.envs.settings import parameters_of
 from shared_control_env.envs.slots import DRIVER
-from shared_control_env.wrappers.slots import SlotWrapper, check_reset
+from shared_control_env.wrappers.slot_wrapper import SlotWrapper, check_reset
 
 
 class DriverModel(SlotWrapper, RecordConstructorArgs):

@@ -26,7 +26,7 @@ from shared_control_env.evaluation import (
     evaluate,
 )
 from shared_control_env.evaluation import runner as runner_module
-from shared_control_env.evaluation.episodes import Batch
+from shared_control_env.evaluation.episodes import EpisodeBatch
 from shared_control_env.evaluation.storage import IDENTITY, ResultsFolder, write_atomically
 from tests.evaluation.single import drive_single
 
@@ -65,7 +65,7 @@ def test_the_single_environment_gives_the_same_metrics(scenario, authority):
     suite = Suite("one", (scenario,), ("oscillation",))
     row = evaluate("distracted", authority, suite, seeds=[11]).iloc[0]
     entries = ("distracted", DRIVERS["distracted"]), (authority, AUTHORITIES[authority])
-    single = drive_single(Batch(scenario, *entries, (("oscillation", 11),), {}))
+    single = drive_single(EpisodeBatch(scenario, *entries, (("oscillation", 11),), {}))
     for name in set(METRICS) - set(TIMED):
         assert single[name] == pytest.approx(row[name], abs=1e-9, nan_ok=True), name
 

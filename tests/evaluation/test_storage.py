@@ -14,7 +14,7 @@ import pytest
 from shared_control_env.controllers.scripted import OverreactingDriver, ScriptedDriver
 from shared_control_env.evaluation import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, Suite, evaluate
 from shared_control_env.evaluation import storage as storage_module
-from shared_control_env.evaluation.episodes import Batch, make_environment, settings_of
+from shared_control_env.evaluation.episodes import EpisodeBatch, make_environment, settings_of
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.replay import entries_of, replay_episode
 from shared_control_env.evaluation.storage import IDENTITY, ResultsFolder, read_manifest
@@ -168,7 +168,7 @@ def test_a_changed_driver_is_run_again_and_the_old_one_found_again(tmp_path):
 def test_one_seed_gives_every_driver_the_same_episode():
     suite = Suite("x", ("cut_in", "bend"), ("bias_ramp", "stuck", "white_noise"))
     batches = [
-        Batch(scenario, (name, entry), ("none", AUTHORITIES["none"]), ((degradation, seed),), {})
+        EpisodeBatch(scenario, (name, entry), ("none", AUTHORITIES["none"]), ((degradation, seed),), {})
         for scenario in suite.scenarios
         for degradation in suite.degradations
         for seed in (0, 7)

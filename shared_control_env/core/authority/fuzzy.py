@@ -3,7 +3,7 @@
 The paper prints neither the operators, nor the rule table, nor the breakpoints of the memberships. The choices made
 here are evenly spaced terms, Z- and S-shaped at the ends and triangular in between; Mamdani inference; and the centre
 of gravity on 501 points. Two pairs of operators can be selected. With product for "and" and sum for aggregation,
-alpha_a is monotone in both risks. With minimum and maximum, alpha_a rises by up to 0.007 where a risk grows.
+alpha_a is monotone in both risks. With minimum and maximum, alpha_a can rise by up to 0.007 as a risk grows.
 """
 
 from __future__ import annotations

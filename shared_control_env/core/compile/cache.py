@@ -59,7 +59,7 @@ def say_once(text: str) -> None:
 
 def _say_uncached(reason: object) -> None:
     say_once(
-        f"compiled functions cannot be kept ({reason}), so that every start compiles them anew; "
+        f"compiled functions cannot be kept ({reason}), so every start compiles them again; "
         "set NUMBA_CACHE_DIR to a folder that can be written to."
     )
 
@@ -77,7 +77,7 @@ def _tidy(path: Path) -> None:
 
 
 def _apart(locator: Any) -> Any:
-    """Derive from one of numba's locators a locator that uses the folder of the present sources below its own."""
+    """Derive a locator from one of numba's; the new one uses a subfolder for the present sources."""
 
     def get_cache_path(self: Any) -> str:
         return os.path.join(locator.get_cache_path(self), FOLDER)
@@ -126,7 +126,7 @@ class _Cache(FunctionCache):
             return super().load_overload(signature, target_context)
         except Exception as error:  # unpickling a damaged file may raise any exception
             say_once(
-                f"the cache in {self._cache_path} is damaged ({type(error).__name__}); what is needed is compiled anew."
+                f"the cache in {self._cache_path} is damaged ({type(error).__name__}); it is compiled again as needed."
             )
             try:
                 self.flush()

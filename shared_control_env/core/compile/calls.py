@@ -26,7 +26,7 @@ from shared_control_env.core.records import record_dtype
 PACKAGE = __name__.partition(".")[0]
 
 VECTOR = types.Array(types.float64, 1, "C")
-"""Type of an array of floats with one dimension."""
+"""Numba's type of a one-dimensional array of double-precision floats."""
 
 MATRIX = types.Array(types.float64, 2, "C")
 """Numba's type of a two-dimensional array of double-precision floats."""
@@ -35,7 +35,7 @@ SINGLES = types.Array(types.float32, 1, "C")
 """Numba's type of a one-dimensional array of single-precision floats."""
 
 _interpreted: list[Callable[..., Any]] = [lambda: None]
-"""Functions by their address, where the core runs as Python; the first entry keeps address 0 from being used."""
+"""Functions of a core that runs as Python; the index is the address. The first entry reserves address 0."""
 
 
 def compiled_type(kind: Any) -> Any:

@@ -72,7 +72,9 @@ def perceive_late(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Par
     ::
 
         z_seen = f(... f(z(k - d), u(k - d)) ..., u(k - 1)),   d = delay / dt, f the model of the controllers
-        y, psi, v_x:  error (1 + weber n),   with the errors from target, road and target speed
+        y, psi, v_x:  error (1 + weber n),   n the random error of each
+
+    The errors of y, psi and v_x are the deviations from the target position, the road and the target speed.
 
     The person perceives the road ahead and the other vehicles correctly. The prediction uses the present curvature at
     the car for the whole delay.
@@ -104,7 +106,9 @@ def perceive_late(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Par
 
 @jit
 def what_is_noticed(seen: Scene, p: Parameters) -> int:
-    """First of the :data:`REASONS` that a perceived scene gives to take over; at k = 0 nothing is felt at the wheel.
+    """First of the :data:`REASONS` to take over that a perceived scene gives.
+
+    At k = 0 nothing is felt at the wheel.
 
     Args:
         seen: the scene as the person perceives it, record of :data:`records.SCENE`.
@@ -140,8 +144,8 @@ def response_time(p: Parameters) -> float:
 
 
 @jit_inlined
-def take_in(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Parameters, seen: Scene) -> bool:
-    """Advance a person by one step, up to the command: compute the perceived scene and whether the person drives.
+def perceive_and_attend(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Parameters, seen: Scene) -> bool:
+    """Advance perception and attention by one step: compute the perceived scene and whether the person drives.
 
     Args:
         scene: record of :data:`records.SCENE`.
@@ -167,7 +171,7 @@ def take_in(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Parameter
 
 
 @jit
-def with_arm_noise(u_h_des: np.ndarray, memory: PersonMemory, p: Parameters) -> None:
+def add_arm_noise(u_h_des: np.ndarray, memory: PersonMemory, p: Parameters) -> None:
     """Apply the signal-dependent noise of the arm: multiply the command by ``1 + arm_noise n``, and clip the result.
 
     Args:

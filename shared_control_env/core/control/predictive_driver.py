@@ -10,7 +10,7 @@ from shared_control_env.core.compile.calls import Interface
 from shared_control_env.core.compile.jit import jit_inlined
 from shared_control_env.core.control.condensing import Workspace
 from shared_control_env.core.control.driver import build_program, count_rows
-from shared_control_env.core.control.person import take_in, with_arm_noise
+from shared_control_env.core.control.person import add_arm_noise, perceive_and_attend
 from shared_control_env.core.control.qp import active_set
 from shared_control_env.core.control.qp.active_set import MAX_ROWS, MAX_VARIABLES, SOLVED, solve_qp
 from shared_control_env.core.parameters import Parameters
@@ -24,7 +24,7 @@ class Program:
         active_set: scratch of the solver.
         P, q, A, low, high: the program, see :func:`control.driver.build_program`.
         x: solution of the program.
-        multipliers: multipliers of the rows.
+        multipliers: Lagrange multipliers of the rows of A.
         seen: the scene as a person perceives it.
         command: the driver's desired command ``[a, delta]`` [m/s^2, rad].
     """
@@ -49,7 +49,7 @@ class DriverReport:
 
     Attributes:
         status: active_set.SOLVED, ITERATION_LIMIT or FAILED.
-        iterations: number of rows added and dropped.
+        iterations: number of rows added to and dropped from the active set.
         primal_residual, dual_residual: residuals of the solution.
         failures: number of steps so far at which the solver failed, so that the last command was held.
         engaged: whether the person drives; if not, the hands rest.
@@ -111,9 +111,9 @@ def drive(
         _solve(scene, p, memory, work, program, report)
         return
     program.seen = scene
-    if take_in(scene, memory.u, person, p, program.seen):
+    if perceive_and_attend(scene, memory.u, person, p, program.seen):
         _solve(program.seen, p, memory, work, program, report)
-        with_arm_noise(program.command, person, p)
+        add_arm_noise(program.command, person, p)
     else:
         program.command[0], program.command[1] = scene.felt[0], scene.felt[1]
         report.status, report.iterations, report.failures = SOLVED, 0, memory.driver_failures

@@ -17,10 +17,10 @@ from shared_control_env.core.parameters import DegradationParameters
 from shared_control_env.core.records import MAX_DELAY, FaultMemory, Signals
 from shared_control_env.nearest import hint
 
-COMMAND, RATE, SHARE, TIME, LENGTH = "command", "rate", "share", "time", "length"
+CHANNEL, RATE, SHARE, TIME, LENGTH = "channel", "rate", "share", "time", "length"
 """Units of a size: the channel's unit [m/s^2 or rad], the channel's unit per second, a share in [0, 1], [s], or [m]."""
 
-UNITS = (COMMAND, RATE, SHARE, TIME, LENGTH)
+UNITS = (CHANNEL, RATE, SHARE, TIME, LENGTH)
 
 
 class Acting(NamedTuple):
@@ -64,7 +64,7 @@ class Kind(NamedTuple):
 
     Attributes:
         name: name of the kind in the settings.
-        unit: unit of the size, see :data:`COMMAND`; None for a kind that has no size.
+        unit: unit of the size, see :data:`CHANNEL`; None for a kind that has no size.
         act: function that returns the degraded command of one channel, compiled with the signature :data:`ACT`.
         perceive: function that changes the automation's perception, compiled with the signature :data:`PERCEIVE`.
         advance: function that advances the memory at every step, compiled with the signature :data:`ADVANCE`.
@@ -167,15 +167,15 @@ KINDS: dict[str, Kind] = {
     kind.name: kind
     for kind in (
         Kind("none", None),
-        Kind("bias", COMMAND, _bias),
+        Kind("bias", CHANNEL, _bias),
         Kind("loss_of_effectiveness", SHARE, _loss_of_effectiveness),
         Kind("stuck", None, _stuck),
         Kind("rate_limit", RATE, _rate_limit),
         Kind("saturation", SHARE, _saturation),
         Kind("delay", TIME, _delay),
-        Kind("white_noise", COMMAND, _white_noise, heeds=("seed",)),
-        Kind("coloured_noise", COMMAND, _coloured_noise, advance=_advance_noise, heeds=("seed", "time_constant")),
-        Kind("oscillation", COMMAND, _oscillation, heeds=("frequency",)),
+        Kind("white_noise", CHANNEL, _white_noise, heeds=("seed",)),
+        Kind("coloured_noise", CHANNEL, _coloured_noise, advance=_advance_noise, heeds=("seed", "time_constant")),
+        Kind("oscillation", CHANNEL, _oscillation, heeds=("frequency",)),
         Kind("drop_out", None, _drop_out),
         Kind("sign_error", None, _sign_error),
         Kind("lane_offset", LENGTH, perceive=_lane_offset, channels=("steering",)),

@@ -91,7 +91,7 @@ def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, s
     """
     predict_ego(scene, signals.u_a_f, line, p, signals)
     predict_neighbours(scene, traffic, line, p.task.tau_p, signals.predicted_neighbours)
-    if p.authority.shared:  # the monitor has the same errors of perception as the automation
+    if p.authority.shared:  # the assessment has the automation's errors of perception
         signals.prediction_road[1] += signals.misperception[0]
         if signals.misperception[1] > 0.0:
             signals.predicted_neighbours[PRECEDING, 0] = 0.0

@@ -13,7 +13,7 @@ from shared_control_env.core.risk.safe_area import BLOCKED, ON_LINE, REACHED
 
 
 class Scratch(NamedTuple):
-    """Scratch arrays of a search through n triangles; the arrays may be longer.
+    """Scratch arrays of a search through n triangles; the arrays may be longer than needed.
 
     Attributes:
         neighbours: list of adjacent triangles, see :func:`adjacency`, shape (n, 3).
@@ -72,7 +72,7 @@ def search_triangles(
     entered. Where corners are cocircular, these triangles depend on the choice of the diagonals.
 
     Args:
-        triangles: vertices (s, d) [m], in any order and orientation, shape (m, 3, 2); made counter-clockwise.
+        triangles: vertices (s, d) [m], in any order and orientation, shape (m, 3, 2); made counter-clockwise in place.
         start, end: path lengths of the rear and the front line of the region [m].
         d: lateral position of the ego on the rear line [m].
         min_width: smallest width of a passage [m].
@@ -187,15 +187,15 @@ def clearance(
     """Width of the passage through a triangle from one edge to another [m].
 
     The path bends around the vertex that both edges share. The width is the distance from this vertex to the nearest
-    boundary on the other side, and at most the length of either edge. The search for the boundary looks through the
-    open edges (Demyen & Buro, Efficient Triangulation-Based Pathfinding, AAAI 2006).
+    boundary on the other side, and at most the length of either edge. The search for the boundary continues through the
+    edges that are shared with another triangle (Demyen & Buro, Efficient Triangulation-Based Pathfinding, AAAI 2006).
 
     Args:
         triangles: counter-clockwise vertices (s, d) [m], shape (m, 3, 2).
         neighbours: list of adjacent triangles, see :func:`adjacency`, shape (>= m, 3).
         i: index of the triangle.
-        entry, leave: indices of its two edges.
-        start, end: path lengths of the rear and the front line [m]; both lines are open.
+        entry, leave: indices of the edges at which the path enters and leaves the triangle.
+        start, end: path lengths of the rear and the front line [m]; these two lines are not boundaries.
         stack: stack of a :class:`Scratch`, overwritten.
     """
     ls, ld, rs, rd = _left_and_right(triangles, i, entry)

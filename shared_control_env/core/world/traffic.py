@@ -91,12 +91,13 @@ def decide_acceleration(
     line: np.ndarray,
     lane_width: float,
 ) -> None:
-    """Write the acceleration of a vehicle, by its plan, into its row.
+    """Compute the acceleration of a vehicle from its plan, and write it into the vehicle's row.
 
-    The vehicle follows or holds its speed. From the onset of its braking on, it brakes at least as hard as planned.
+    The vehicle follows the vehicle ahead or holds its speed. From the onset of its braking on, it brakes at least as
+    hard as planned.
 
     Args:
-        row: the vehicle's row of the traffic array, its acceleration is written, shape (8,).
+        row: the vehicle's row of the traffic array, shape (8,); the acceleration is written.
         plan: plan of the vehicle.
         t: time [s].
         ego: the ego as a row of the traffic array, shape (8,).

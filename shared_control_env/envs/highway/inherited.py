@@ -1,4 +1,4 @@
-"""Methods of highway-env's environments beside reset, step and render: those that apply here, and those refused."""
+"""Methods of highway-env's environments other than reset, step and render: some apply here, others raise an error."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class HighwayEnv(AbstractEnv):
         )
 
     def set_preferred_lane(self, preferred_lane: int | None = None) -> AbstractEnv:
-        """A copy of the environment in which vehicles of highway-env's IDMVehicle prefer a lane.
+        """A copy of the environment in which vehicles of highway-env's class IDMVehicle prefer a lane.
 
         Args:
             preferred_lane: index of the lane; None to change nothing.
@@ -79,7 +79,7 @@ class HighwayEnv(AbstractEnv):
         return super().set_preferred_lane(preferred_lane)
 
     def set_route_at_intersection(self, _to: str) -> AbstractEnv:
-        """A copy of the environment in which vehicles of highway-env's IDMVehicle have a route.
+        """A copy of the environment in which vehicles of highway-env's class IDMVehicle have a route.
 
         Args:
             _to: destination, as in highway-env.
@@ -91,7 +91,7 @@ class HighwayEnv(AbstractEnv):
         return super().set_route_at_intersection(_to)
 
     def randomize_behavior(self) -> AbstractEnv:
-        """A copy of the environment in which vehicles of highway-env's IDMVehicle behave randomly differently.
+        """A copy of the environment in which the behaviour of vehicles of highway-env's class IDMVehicle is randomised.
 
         Raises:
             ValueError: if there is no such vehicle.

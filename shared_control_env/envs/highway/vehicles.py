@@ -132,7 +132,7 @@ class EgoVehicle(ArrayVehicle):
             dt: simulation step [s].
         """
         action = self.action
-        entries.drive(self.array, action["acceleration"], action["steering"], dt, self.parameters, self._work)
+        entries.step_plant(self.array, action["acceleration"], action["steering"], dt, self.parameters, self._work)
 
 
 class LaneFollower(ArrayVehicle):

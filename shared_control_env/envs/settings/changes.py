@@ -12,7 +12,7 @@ def as_plain(value: Any) -> Any:
     """Convert a value of a configuration to built-in Python types.
 
     Args:
-        value: mapping, sequence, NumPy number or array, tensor, or any other value, which is kept.
+        value: mapping, sequence, NumPy number or array, or tensor; any other value is returned unchanged.
     """
     if isinstance(value, Mapping):
         return {key: as_plain(item) for key, item in value.items()}
@@ -122,7 +122,7 @@ def change(config: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]
         The changed settings, a new dict.
 
     Raises:
-        ValueError: for an unknown key; or if the changes set a setting to another value and also draw it.
+        ValueError: for an unknown key; or if the changes give a setting a new value and also list it in ``randomise``.
     """
     merged = merge(config, changes)
     paths = {".".join(path): path for path in named(changes, config)}

@@ -74,7 +74,7 @@ def name_in(table: Mapping[str, Any], *but: str) -> Any:
 
 
 class Section(BaseModel):
-    """Base of all groups of settings: nothing unknown, nothing of another type, no infinity."""
+    """Base of all groups of settings. Unknown keys, values of another type and infinite values are refused."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -109,7 +109,7 @@ class RoadSettings(Section):
 
 
 class EgoSettings(Section):
-    """Where the ego starts: at s = 0, in the lane that it is to keep."""
+    """Start of the ego at s = 0, in the lane to keep."""
 
     lane: Lane = 0
     speed: Speed = 15.0  # [m/s]
@@ -126,7 +126,7 @@ class BrakeSettings(Section):
 
 
 class LaneChangeSettings(Section):
-    """A move over to another lane (core.world.lane_change)."""
+    """A change to another lane (core.world.lane_change)."""
 
     onset: Onset  # [s]
     duration: Annotated[float, Interval(ge=0.1, le=100.0)] = 4.0  # [s]
@@ -140,34 +140,34 @@ class VehicleSettings(Section):
     position: Annotated[float, Interval(ge=-core.LONGEST_ROAD, le=core.LONGEST_ROAD)]  # along the road [m]
     speed: Speed  # [m/s]
     behaviour: Literal["constant", "idm"] = "constant"
-    desired_speed: TargetSpeed | None = None  # of idm [m/s]; None for its first speed
+    desired_speed: TargetSpeed | None = None  # of idm [m/s]; None for the initial speed
     brake: BrakeSettings | None = None
     lane_change: LaneChangeSettings | None = None
 
 
 class FaultSettings(Section):
-    """A degradation of the automation (core.faults); what its size means depends on its kind."""
+    """A degradation of the automation (core.faults). The kind defines the meaning of the size."""
 
     kind: name_in(KINDS, "none") = "bias"
     channel: Literal["acceleration", "steering", "both"] = "steering"
     onset: Onset  # [s]
     ramp: NonNegative = 0.0  # [s]
     duration: Positive | None = None  # [s]; None for a permanent one
-    period: NonNegative = 0.0  # of one that comes and goes [s]; 0 for one that stays
-    duty: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.5  # share of the period in which it is there
+    period: NonNegative = 0.0  # of an intermittent degradation [s]; 0 if not intermittent
+    duty: Annotated[float, Interval(gt=0.0, le=1.0)] = 0.5  # share of each period during which it acts
     size: float | None = None
     time_constant: Annotated[float, Interval(ge=1e-3, le=1e3)] = 0.5  # of coloured noise [s]
     frequency: Annotated[float, Interval(gt=0.0, le=1e3)] = 0.5  # of an oscillation [Hz]
-    seed: Seed | None = None  # of noise; None to have it drawn
+    seed: Seed | None = None  # of noise; None for a random seed
 
 
 class RandomSettings(Section):
-    """A setting drawn at the start of each episode: uniform between two ends, log-normal, or one of several values."""
+    """A setting drawn at the start of each episode: uniform within limits, log-normal, or one of several values."""
 
     setting: str  # its path, such as "ego.speed" or "vehicles.0.position"
     low: float | None = None
     high: float | None = None
-    median: Positive | None = None  # of a log-normal one, cut off at 3 deviations
+    median: Positive | None = None  # of a log-normal distribution, cut off at 3 standard deviations
     spread: Annotated[float, Interval(ge=0.0, le=2.0)] | None = None  # standard deviation of its logarithm [-]
     choices: Annotated[list[float], MinLen(1), MaxLen(10_000)] | None = None
 
@@ -177,11 +177,11 @@ class AuthoritySettings(Section):
 
     law: Literal[LAWS] = "paper"
     operators: Literal[OPERATORS] = "product-sum"
-    strict: bool = False  # Eq. 10's second line as printed, for alpha < 1 alone
+    strict: bool = False  # Eq. 10's second line as printed, only for alpha_a < 1
 
 
 class InternalModelSettings(Section):
-    """Whether the predictive driver knows its own response (core.control.driver), and what it believes of it."""
+    """Whether the predictive driver knows its own response (core.control.driver), and the values that it assumes."""
 
     active: bool = False
     K_h: Annotated[float, Interval(ge=0.0, le=100.0)] | None = None  # [-]; None for that of driver_lag
@@ -196,7 +196,7 @@ class SolverSettings(Section):
 
 
 class ModelSettings(Section):
-    """The car as controllers, person and risk assessment take it to be, with linear tyres; None for what it is."""
+    """The car as controllers, person and risk assessment take it to be, with linear tyres; None for the true value."""
 
     m: core.Mass | None = None  # [kg]
     I_z: core.Inertia | None = None  # [kg m^2]
@@ -207,13 +207,13 @@ class ModelSettings(Section):
 
 
 class ObservationSettings(Section):
-    """What the environment gives to see (core.feedback.observation)."""
+    """The observation that the environment returns (core.feedback.observation)."""
 
     type: name_in(OBSERVATIONS) = DRIVER_V0.name
 
 
 class TermSettings(Section):
-    """A term of the reward beside the standard ones (core.feedback.reward)."""
+    """A term of the reward in addition to the standard ones (core.feedback.reward)."""
 
     term: name_in(TERMS, *STANDARD)
     weight: Weight
@@ -245,11 +245,11 @@ _Reward: Any = create_model(
     __doc__="Weights of the standard terms of the reward (core.feedback.reward).",
     **{name: (Weight, TERMS[name].weight) for name in STANDARD},
 )
-_Person = _section("_Person", core.PersonParameters, "seed", seed=(Seed | None, None))  # None to have it drawn
+_Person = _section("_Person", core.PersonParameters, "seed", seed=(Seed | None, None))  # None for a random seed
 
 
 class Settings(Section):
-    """All settings. The first group is highway-env's own, with its meaning there."""
+    """All settings. The first group consists of highway-env's own settings, with the same meaning as there."""
 
     simulation_frequency: _count(1000) = 20  # [Hz]
     policy_frequency: _count(100) = 20  # [Hz]
@@ -269,7 +269,7 @@ class Settings(Section):
     vehicles: Annotated[list[VehicleSettings], MaxLen(100)] = []
     faults: Annotated[list[FaultSettings], MaxLen(20)] = []
     fault_at: Literal[PLACES] = "command"  # where degradations of the command act (core.faults)
-    misperception: Literal["automation", "shared"] = "automation"  # whose: the monitor may share the automation's
+    misperception: Literal["automation", "shared"] = "automation"  # shared: also in the risk assessment
     degradations: list[name_in(DEGRADATIONS)] = []  # one of these is drawn at the start of each episode
     randomise: Annotated[list[RandomSettings], MaxLen(1000)] = []
     task: _Task = _Task()

@@ -13,7 +13,7 @@ from shared_control_env.core.authority.fuzzy import OPERATORS
 from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.core.faults import kinds
 from shared_control_env.core.faults.command import PLACES
-from shared_control_env.core.faults.kinds import COMMAND, KINDS, RATE
+from shared_control_env.core.faults.kinds import CHANNEL, KINDS, RATE
 from shared_control_env.core.feedback.reward import TERMS, VALUE
 from shared_control_env.core.records import MAX_TERMS, pack, record_dtype
 from shared_control_env.core.world import tyre
@@ -113,7 +113,7 @@ def fault_records(settings: Settings) -> np.ndarray:
                 act=act,
                 perceive=perceive,
                 advance=advance,
-                in_unit_of_channel=kind.unit in (COMMAND, RATE),
+                in_unit_of_channel=kind.unit in (CHANNEL, RATE),
                 acceleration=fault.channel != "steering",
                 steering=fault.channel != "acceleration",
                 onset=fault.onset,

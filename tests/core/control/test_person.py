@@ -37,7 +37,7 @@ def watch(person, scenes, commands=None):
     for k, scene in enumerate(scenes):
         seen[()] = scene
         u_last = np.zeros(2) if commands is None or k == 0 else commands[k - 1]
-        drives = entries.take_in(scene, u_last, memory, p, seen)
+        drives = entries.perceive_and_attend(scene, u_last, memory, p, seen)
         out.append((seen.copy(), bool(drives), memory.copy()))
     return out
 

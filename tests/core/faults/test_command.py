@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.faults import command as d
 from shared_control_env.core.faults import perception
-from shared_control_env.core.faults.kinds import COMMAND, KINDS, RATE, addresses
+from shared_control_env.core.faults.kinds import CHANNEL, KINDS, RATE, addresses
 from shared_control_env.core.parameters import DegradationParameters, Limits
 from shared_control_env.core.records import FAULT_MEMORY, MAX_DELAY, SIGNALS, pack, record_dtype
 
@@ -25,7 +25,7 @@ def misperceive(t, faults, signals):
 def fault_of(kind, **fields):
     """Parameters of a degradation of a kind, its compiled functions among them."""
     act, perceive, advance = addresses(KINDS[kind])
-    in_unit = KINDS[kind].unit in (COMMAND, RATE)
+    in_unit = KINDS[kind].unit in (CHANNEL, RATE)
     return DegradationParameters(list(KINDS).index(kind), act, perceive, advance, in_unit_of_channel=in_unit, **fields)
 
 

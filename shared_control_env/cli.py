@@ -24,7 +24,7 @@ from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
-from shared_control_env.vector.environment import settings_for_kernel
+from shared_control_env.vector.checks import checked_settings
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 COLUMNS = {
@@ -190,7 +190,7 @@ def replay(
         table.add_row(name, f"{value:.4g}", METRICS[name].unit)
     console.print(table)
     if place is not None and frames is not None:
-        frequency = settings_for_kernel(case, config).policy_frequency
+        frequency = checked_settings(case, config, for_kernel=False).policy_frequency
         record(frames, place, frequency)
         console.print(f"The video is {video}.", markup=False)
 

@@ -44,3 +44,17 @@ def _is_slip(text: str, other: str) -> bool:
 
 def _plain(name: object) -> str:
     return str(name).lower().translate(str.maketrans("", "", " -_"))
+
+
+def check_new_name(what: str, name: object, table: Iterable[object]) -> None:
+    """Raise ValueError unless a name is a text that a table does not hold yet.
+
+    Args:
+        what: kind of thing that is named, for the message.
+        name: as given.
+        table: names that are taken.
+    """
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"{what}: its name = {name!r} must be a text that is not empty")
+    if name in table:
+        raise ValueError(f"{what} {name!r} is there already")

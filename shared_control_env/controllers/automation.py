@@ -39,11 +39,12 @@ class Automation:
 
     Args:
         parameters: :func:`records.pack` of :class:`Parameters`.
+        memory: record of :data:`records.AUTOMATION_MEMORY`, a 0-d array; by default a record of its own.
     """
 
-    def __init__(self, parameters: np.ndarray) -> None:
+    def __init__(self, parameters: np.ndarray, memory: np.ndarray | None = None) -> None:
         self._parameters = parameters
-        self._memory = np.zeros((), AUTOMATION_MEMORY)
+        self._memory = np.zeros((), AUTOMATION_MEMORY) if memory is None else memory
         self._work = np.zeros((), WORKSPACE)
 
     @property

@@ -8,7 +8,7 @@ import numpy as np
 
 from shared_control_env.core.faults.kinds import KINDS
 from shared_control_env.core.parameters import Limits
-from shared_control_env.nearest import hint
+from shared_control_env.nearest import check_new_name, hint
 
 Range = tuple[float, float]
 
@@ -99,10 +99,16 @@ def add_degradation(name: str, degradation: Degradation) -> None:
     Raises:
         ValueError: if the name is taken, or the kind is unknown.
     """
-    if name in DEGRADATIONS:
-        raise ValueError(f"degradation {name!r} is there already")
+    check_new_name("degradation", name, DEGRADATIONS)
     if degradation.kind not in KINDS:
         raise ValueError(f"degradation {name!r} has kind = {degradation.kind!r}; {hint(degradation.kind, KINDS)}")
+    kind = KINDS[degradation.kind]
+    wrong = [channel for channel in degradation.channels if channel not in kind.channels]
+    if wrong or not degradation.channels or isinstance(degradation.channels, str):
+        raise ValueError(f"degradation {name!r} has channels = {degradation.channels!r}; {hint(wrong, kind.channels)}")
+    if (degradation.size is None) != (kind.unit is None):
+        needs = "has none" if kind.unit is None else "needs a range of it, (low, high)"
+        raise ValueError(f"degradation {name!r} has size = {degradation.size!r}; its kind {kind.name!r} {needs}")
     DEGRADATIONS[name] = degradation
 
 

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import gymnasium as gym
 
+from shared_control_env.nearest import check_new_name
+
 
 class Scenario(NamedTuple):
     """A registered scenario.
@@ -272,6 +274,10 @@ STANDARD = tuple(SCENARIOS)
 """Names of the scenarios that the package defines; user-defined scenarios come after them."""
 
 
+ENTRY = "scenario_"
+"""Begins the name of a scenario's entry point, so that it cannot be that of something else in the module."""
+
+
 def add_scenario(name: str, scenario: Scenario) -> None:
     """Add a scenario: under its name for suites of the benchmark, and under its id with Gymnasium.
 
@@ -282,12 +288,19 @@ def add_scenario(name: str, scenario: Scenario) -> None:
     Raises:
         ValueError: if the name or the id is taken.
     """
-    if name in SCENARIOS:
-        raise ValueError(f"scenario {name!r} is there already")
+    from shared_control_env.envs.settings.changes import as_plain  # whose import takes time
+
+    check_new_name("scenario", name, SCENARIOS)
+    if not name.isidentifier():
+        raise ValueError(f"scenario: its name = {name!r} must be an identifier, such as my_road")
     if scenario.id in gym.registry:
         raise ValueError(f"id {scenario.id!r} is registered already")
-    SCENARIOS[name] = scenario
-    register(name)
+    SCENARIOS[name] = scenario._replace(settings=as_plain(scenario.settings))
+    try:
+        register(name)
+    except Exception:
+        del SCENARIOS[name]
+        raise
 
 
 def register(name: str) -> None:
@@ -300,6 +313,6 @@ def register(name: str) -> None:
     """
     gym.register(
         id=SCENARIOS[name].id,
-        entry_point=f"shared_control_env.wrappers.limited:{name}",
-        vector_entry_point=f"shared_control_env.vector.environment:{name}",
+        entry_point=f"shared_control_env.wrappers.limited:{ENTRY}{name}",
+        vector_entry_point=f"shared_control_env.vector.environment:{ENTRY}{name}",
     )

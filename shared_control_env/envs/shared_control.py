@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any
 
 import gymnasium as gym
@@ -241,7 +242,8 @@ class SharedControlEnv(HighwayEnv):
         self._bind()
         self._path = np.zeros((settings.steps + 1, 2))
         given = self._given_automation
-        self._automation = Automation(self.parameters) if given is None else given
+        memory = self._batch.automations.reshape(())
+        self._automation = Automation(self.parameters, memory) if given is None else given
         self._automation.reset()
 
     def _place_vehicles(self) -> None:
@@ -260,7 +262,8 @@ class SharedControlEnv(HighwayEnv):
 
     def _bind(self) -> None:
         """Make the arrays of the vehicles views of the batch. Needed after a reset, a copy, or a change of vehicles."""
-        ego, others = self.vehicle, self.road.vehicles[1:]
+        ego = self.vehicle
+        others = [vehicle for vehicle in self.road.vehicles if vehicle is not ego]
         batch = self._batch
         states, traffic = np.zeros((1, 6)), np.zeros((1, len(others), 8))
         plans = np.zeros((1, len(others)), batch.plans.dtype)
@@ -350,6 +353,7 @@ class SharedControlEnv(HighwayEnv):
         )
         self._batch.ended[0] = resetting
         if self._given_automation is None and not self._foreign and not every_frame and len(self._corners) <= MAX_HOLES:
+            self._batch.transitions["crashed"][0] |= not resetting and self.vehicle.crashed
             self._run_kernel()
             if not resetting:
                 self.road.pass_frames(frames, self._setup.dt)
@@ -357,7 +361,7 @@ class SharedControlEnv(HighwayEnv):
         else:
             self._advance_with_python(resetting)
         if not resetting:
-            self.steps += 1
+            self.steps = int(self.scene["k"])
             self.time = self.steps / self.episode.policy_frequency
         # An episode may be continued past its end; the drawn path ends with the duration.
         self._path[min(self.steps, len(self._path) - 1)] = self._batch.states[0, :2]
@@ -373,7 +377,7 @@ class SharedControlEnv(HighwayEnv):
             batch.transitions["crashed"][0] = self.vehicle.crashed
         for vehicle, row in self._foreign:
             write_row(vehicle, row)
-        k = 0 if resetting else self.steps + 1
+        k = 0 if resetting else int(self.scene["k"]) + 1
         count = kernel.look(k, resetting, batch, setup, out, works, self._corners)
         if count > MAX_HOLES:
             triangles = triangulate_any(self.scene["region"], self._corners[:count])
@@ -391,6 +395,10 @@ class SharedControlEnv(HighwayEnv):
         """Check the solution of a user-defined automation, and clip its command to the limits."""
         if not isinstance(solution, Solution):
             raise ValueError(f"automation.act() gave {solution!r}, which is no controllers.solution.Solution")
+        for name in ("status", "iterations", "dual_residual"):
+            value = getattr(solution, name)
+            if not isinstance(value, int | float | np.number):
+                raise ValueError(f"automation.act() gave a Solution with {name} = {value!r}, which is no number")
         command = np.clip(checked_command(solution.command, "automation"), -self.command_limits, self.command_limits)
         return solution._replace(command=command)
 
@@ -499,6 +507,8 @@ class SharedControlEnv(HighwayEnv):
         self.vehicle.array[:] = state
         for vehicle, row in zip(self.road.vehicles[1:], traffic, strict=True):
             vehicle.array[:] = row
+        for vehicle in self.road.vehicles:  # the viewer marks those that overlap now
+            vehicle.crashed = False
         self.scene[()], self.signals[()], self.noted[()] = scene, signals, noted
         self.steps = len(path) - 1
         self._path[: len(path)] = path
@@ -538,6 +548,22 @@ class SharedControlEnv(HighwayEnv):
         return {**self.__dict__, **process}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore a pickled or copied environment, with the function addresses of this process."""
+        """Continue from the state of the pickled or copied environment.
+
+        Args:
+            state: state of :meth:`__getstate__`.
+        """
         self.__dict__.update(state)
         refresh_addresses([self.episode], self._batch)
+        self._bind()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> SharedControlEnv:
+        """Copy as pickles do; highway-env's own copy would part the vehicles from the batch.
+
+        Args:
+            memo: objects that are copied already, of :mod:`copy`.
+        """
+        new = type(self).__new__(type(self))
+        memo[id(self)] = new
+        new.__setstate__(deepcopy(self.__getstate__(), memo))
+        return new

@@ -128,9 +128,14 @@ def refresh_addresses(episodes: Sequence[Settings], starts: Starts | Batch) -> N
         starts: arrays that were pickled or copied, possibly in another process.
     """
     for i, episode in enumerate(episodes):
-        fresh = parameters_of(episode)
+        try:
+            fresh, faults = parameters_of(episode), fault_records(episode)
+        except KeyError as error:
+            raise ValueError(
+                f"{error.args[0]!r}, which this environment uses, is not known in this program; add it before, as the "
+                "program did that made the environment"
+            ) from None
         starts.parameters["vehicle"]["tyre"][i] = fresh.vehicle.tyre
         starts.parameters["reward"]["addresses"][i] = fresh.reward.addresses
-        faults = fault_records(episode)
         for name in ("act", "perceive", "advance"):
             starts.faults[name][i, : len(faults)] = faults[name]

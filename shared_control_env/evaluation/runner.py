@@ -34,7 +34,7 @@ from shared_control_env.evaluation.episodes import MOST_SEEDS, EpisodeBatch, pla
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.replay import GIVEN
 from shared_control_env.evaluation.storage import MAY_GROW, REPORT, TABLE, ResultsFolder, sorted_table, write_atomically
-from shared_control_env.vector.environment import settings_for_kernel
+from shared_control_env.vector.checks import checked_settings
 
 ENGINES = ("local", "ray")
 """Names of the engines."""
@@ -155,7 +155,8 @@ def _check_settings(batches: Sequence[EpisodeBatch]) -> None:
         key = batch.scenario, json.dumps(config, sort_keys=True, default=repr)
         if key not in seen:
             seen.add(key)
-            settings = settings_for_kernel(SCENARIOS[batch.scenario], config)
+            for_kernel = batch.automation is None
+            settings = checked_settings(SCENARIOS[batch.scenario], config, for_kernel)
             if settings.has_person and batch.driver[1].make is not None:
                 raise ValueError(
                     f"config['person']['active'] = True would not act: {batch.driver[0]!r} is no driver of the kernel"

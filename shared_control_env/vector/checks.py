@@ -172,19 +172,21 @@ def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
     return spellings[text]
 
 
-def settings_for_kernel(scenario: Scenario, config: Mapping[str, Any]) -> Settings:
-    """Settings of a scenario with changes. All checks are made, including those for the kernel.
+def checked_settings(scenario: Scenario, config: Mapping[str, Any], for_kernel: bool = True) -> Settings:
+    """Settings of a scenario with changes, after all checks.
 
     Args:
         scenario: scenario that provides the defaults.
         config: changes to the settings.
+        for_kernel: whether the kernel runs them, which supports fewer settings than the single environment.
 
     Raises:
-        ValueError: for a wrong setting, or a setting that only the single environment supports.
+        ValueError: for a wrong setting, or, for the kernel, a setting that only the single environment supports.
     """
     default = configuration.merge(configuration.plain(Settings()), scenario.settings)
     settings = configuration.check(configuration.change(default, config))
-    _check_for_kernel(settings)
+    if for_kernel:
+        _check_for_kernel(settings)
     return settings
 
 

@@ -32,7 +32,7 @@ from shared_control_env.core.feedback.observation import OBSERVATIONS
 from shared_control_env.core.loading import load
 from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.episode import draw_episode, is_random
-from shared_control_env.envs.scenarios import SCENARIOS, Scenario
+from shared_control_env.envs.scenarios import ENTRY, SCENARIOS, Scenario
 from shared_control_env.envs.settings import Settings
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, observation_space, space_of
 from shared_control_env.envs.starts import enlarged, refresh_addresses, sizes_for, start_of, write_start
@@ -45,7 +45,7 @@ from shared_control_env.vector.checks import (
     checked_generators,
     checked_mask,
     checked_mode,
-    settings_for_kernel,
+    checked_settings,
 )
 from shared_control_env.vector.pictures import Pictures
 from shared_control_env.vector.threads import Threads
@@ -124,7 +124,7 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"render_mode = {render_mode!r} must be one of {self.metadata['render_modes']} or None")
         self._mode, self.render_mode = checked_mode(autoreset_mode), render_mode
         self._driver = bool(driver)
-        settings = settings_for_kernel(scenario, {} if config is None else config)
+        settings = checked_settings(scenario, {} if config is None else config)
         if settings.has_person and not driver:
             raise ValueError("config['person']['active'] = True would not act: it needs driver=True")
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
@@ -316,9 +316,9 @@ class SharedControlVectorEnv(VectorEnv):
     def rollout(self, steps: int) -> Rollout:
         """Drive many time steps; both slots must be bound.
 
-        Many steps run without returning to Python, unless episodes are drawn at random, pictures are rendered, or the
-        autoreset mode is ``same_step``. If autoreset is disabled, an environment stands still after the end of its
-        episode.
+        Many steps run without returning to Python, unless episodes are drawn at random, pictures are rendered, the
+        autoreset mode is ``same_step``, or a user-defined allocator's authorities are checked. If autoreset is
+        disabled, an environment stands still after the end of its episode.
 
         Args:
             steps: number of steps of every environment.
@@ -334,7 +334,8 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"rollout() needs limiter=True and driver=True; open are {list(self._open.slots)}")
         steps = checked_count("steps", steps)
         out = self._outputs()
-        one_by_one = self._random or self.render_mode is not None or self._mode is AutoresetMode.SAME_STEP
+        own = self._allocate is not fuzzy_authority
+        one_by_one = self._random or own or self.render_mode is not None or self._mode is AutoresetMode.SAME_STEP
         piece = 1 if one_by_one else max(1, AT_ONCE // self.num_envs)
         taken = []
         for first in range(0, steps, piece):
@@ -460,10 +461,14 @@ class SharedControlVectorEnv(VectorEnv):
     def _move(self, steps: int, active: np.ndarray, autoreset: bool, actions: Actions, out: Outputs) -> Rollout:
         """Advance environments. What a later reset or picture needs is stored even if an interrupt occurs."""
         try:
-            return self._advance(steps, active, autoreset, actions, out)
+            result = self._advance(steps, active, autoreset, actions, out)
         finally:
             self._observations = out.observations.copy()
             self._pictures.note(out.infos, active, self._batch)
+        wrong = np.flatnonzero(active & np.isnan(out.infos["alpha_a"]))
+        if len(wrong):
+            raise ValueError(f"the allocator gave environment {wrong[0]} alpha_a = nan; it must be in [0, 1]")
+        return result
 
     def _advance(self, steps: int, active: np.ndarray, autoreset: bool, actions: Actions, out: Outputs) -> Rollout:
         """Run :func:`kernel.advance` in all threads at once; it releases Python's global interpreter lock."""
@@ -559,6 +564,7 @@ class Vectorised:
 
 def __getattr__(name: str) -> Vectorised:
     """The entry point of a scenario, found by its key in :data:`scenarios.SCENARIOS`."""
-    if name not in SCENARIOS:
+    key = name.removeprefix(ENTRY)
+    if key not in SCENARIOS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return Vectorised(SCENARIOS[name])
+    return Vectorised(SCENARIOS[key])

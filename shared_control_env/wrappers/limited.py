@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from shared_control_env.core import loading
-from shared_control_env.envs.scenarios import SCENARIOS
+from shared_control_env.envs.scenarios import ENTRY, SCENARIOS
 
 if TYPE_CHECKING:
     from shared_control_env.controllers.allocators import Allocator
@@ -63,6 +63,7 @@ class Limited:
 
 def __getattr__(name: str) -> Limited:
     """The entry point of a scenario, by its key in :data:`scenarios.SCENARIOS`."""
-    if name not in SCENARIOS:
+    key = name.removeprefix(ENTRY)
+    if key not in SCENARIOS:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return Limited(name)
+    return Limited(key)

@@ -161,6 +161,32 @@ def test_pickles_and_copies():
             assert_same(a, b)
 
 
+@pytest.mark.parametrize("traffic", [{}, {"other_vehicles_type": "highway_env.vehicle.behavior.IDMVehicle"}])
+def test_the_vehicles_of_a_copy_are_those_it_drives(traffic):
+    env, ahead = (TwoLaneEnv({"duration": 2.0, **traffic}) for _ in range(2))
+    action = {"driver": np.array([0.1, 0.05]), "authority": np.zeros(1)}
+    for each, steps in ((env, 1), (ahead, 2)):
+        each.reset(seed=0)
+        for _ in range(steps):
+            each.step(action)
+    for twin in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
+        before = [vehicle.position.copy() for vehicle in env.road.vehicles]
+        twin.step(action)
+        for vehicle, moved in zip(twin.road.vehicles, ahead.road.vehicles, strict=True):
+            np.testing.assert_array_equal(vehicle.position, moved.position)
+        for vehicle, position in zip(env.road.vehicles, before, strict=True):
+            np.testing.assert_array_equal(vehicle.position, position)  # the copy moves no vehicle of the original
+
+
+def test_a_collision_that_the_user_sets_ends():
+    env = TwoLaneEnv({"vehicles": []})
+    env.reset(seed=0)
+    env.vehicle.crashed = True
+    _, _, terminated, _, info = env.step({"driver": np.zeros(2), "authority": np.ones(1)})
+    assert terminated
+    assert info["crashed"]
+
+
 def test_observations_are_bounded_and_new():
     env = gym.make(IDS[0])
     env.action_space.seed(0)

@@ -405,3 +405,21 @@ def test_starts_without_highway_env():
 def test_memory_of_an_environment(name):
     env = gym.make_vec(name, num_envs=64).unwrapped
     assert sum(array.nbytes for array in env._batch) // 64 == env.bytes_per_environment <= 4608
+
+
+class Failing:
+    """An allocator whose authority is undefined from the fourth step on."""
+
+    @staticmethod
+    def compiled(scene, signals, p):
+        return 0.5 if scene.k < 3 or scene.k > 4 else np.nan
+
+
+@pytest.mark.parametrize(
+    "drive", [lambda env: env.rollout(10), lambda env: [env.step(np.zeros(2, int)) for _ in "0123"]]
+)
+def test_an_authority_that_is_no_number_is_refused(drive):
+    env = gym.make_vec(TWO_LANE, num_envs=2, driver=True, limiter=Failing())
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match="environment 0 alpha_a = nan"):
+        drive(env)

@@ -9,6 +9,8 @@ the rest to be compiled again.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dis import get_instructions
+from types import FunctionType
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -94,6 +96,10 @@ class Interface:
             ValueError: if numba cannot compile the function with this signature.
         """
         plain: Any = getattr(function, "py_func", function)
+        if not isinstance(plain, FunctionType):
+            raise ValueError(f"{function!r} must be a function, defined by def, which numba compiles")
+        if any(each.opname in ("RAISE_VARARGS", "LOAD_ASSERTION_ERROR") for each in get_instructions(plain)):
+            raise ValueError(f"{plain.__qualname__} raises errors, which compiled code cannot pass on; return a number")
         if plain not in self._compiled:
             self._compiled[plain] = self._interpret(function) if is_interpreted() else self._compile(plain)
         return self._compiled[plain][0]
@@ -110,7 +116,7 @@ class Interface:
         compiled._cache = cache_of(function) if own else no_cache()
         try:
             compiled.compile()
-        except NumbaError as error:
+        except (NumbaError, TypeError) as error:
             name = f"{function.__module__}.{function.__qualname__}"
             raise ValueError(f"{name} cannot be compiled: {error}") from None
         return compiled.address, compiled  # the object is kept, since its code would be freed otherwise

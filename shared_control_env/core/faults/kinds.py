@@ -15,10 +15,13 @@ from shared_control_env.core.compile.calls import Interface, by_value
 from shared_control_env.core.faults.noise import coloured, standard_normal
 from shared_control_env.core.parameters import DegradationParameters
 from shared_control_env.core.records import MAX_DELAY, FaultMemory, Signals
-from shared_control_env.nearest import hint
+from shared_control_env.nearest import check_new_name, hint
 
 CHANNEL, RATE, SHARE, TIME, LENGTH = "channel", "rate", "share", "time", "length"
 """Units of a size: the channel's unit [m/s^2 or rad], the channel's unit per second, a share in [0, 1], [s], or [m]."""
+
+HEEDED = ("seed", "time_constant", "frequency")
+"""Fields of a fault's settings that a kind may use beside its size."""
 
 UNITS = (CHANNEL, RATE, SHARE, TIME, LENGTH)
 
@@ -198,12 +201,16 @@ def add_kind(kind: Kind) -> None:
         ValueError: if the name is taken, if the unit is unknown, if the kind has neither ``act`` nor ``perceive``, or
             if numba cannot compile a function.
     """
-    if kind.name in KINDS:
-        raise ValueError(f"kind {kind.name!r} is there already")
+    check_new_name("kind", kind.name, KINDS)
     if kind.unit not in (*UNITS, None):
         raise ValueError(f"kind {kind.name!r} has unit = {kind.unit!r}; {hint(kind.unit, UNITS)}")
     if kind.act is None and kind.perceive is None:
         raise ValueError(f"kind {kind.name!r} does nothing: give it act or perceive")
+    for field, valid in (("heeds", HEEDED), ("channels", ("steering", "acceleration", "both"))):
+        given = getattr(kind, field)
+        wrong = [each for each in given if each not in valid] if isinstance(given, tuple | list) else [given]
+        if wrong:
+            raise ValueError(f"kind {kind.name!r} has {field} = {given!r}; {hint(wrong[0], valid)}")
     addresses(kind)
     KINDS[kind.name] = kind
 

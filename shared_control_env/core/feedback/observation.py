@@ -6,17 +6,17 @@ The settings select one specification. :func:`add_observation` adds a specificat
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import pi
-from typing import NamedTuple
+from math import inf, pi
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shared_control_env.core.compile.calls import MATRIX, SINGLES, Interface
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT, Memory, Scene
+from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT, Memory, Scene, pack, record_dtype
 from shared_control_env.core.world.road import curvature_at
-from shared_control_env.nearest import hint
+from shared_control_env.nearest import check_new_name, hint
 
 PREVIEW = np.array([0.0, 10.0, 20.0, 40.0])
 """Distances ahead at which the observation contains the road's curvature [m]."""
@@ -133,10 +133,43 @@ def add_observation(observation: Observation) -> None:
     Raises:
         ValueError: if the name is taken, or if numba cannot compile the function.
     """
-    if observation.name in OBSERVATIONS:
-        raise ValueError(f"observation {observation.name!r} is there already")
-    WRITE.address(observation.write)
+    check_new_name("observation", observation.name, OBSERVATIONS)
+    features: tuple[Any, ...] = observation.features or (None,)
+    for feature in features:
+        pair = isinstance(feature, tuple | list) and len(feature) == 2
+        if not pair or not isinstance(feature[1], int | float) or not 0.0 < feature[1] < inf:
+            raise ValueError(f"observation {observation.name!r} has feature = {feature!r}, not a name and a scale > 0")
+    _check_writes(observation)
     OBSERVATIONS[observation.name] = observation
+
+
+def _check_writes(observation: Observation) -> None:
+    """Raise ValueError if an observation writes more entries than it has features; that would be another's memory."""
+    size = observation.size
+    out = np.full(size + 1000, np.nan, dtype=np.float32)
+    scene, memory = np.zeros((), record_dtype(Scene)), np.zeros((), record_dtype(Memory))
+    line, parameters = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 100.0]]), pack(Parameters())
+    write_features(WRITE.address(observation.write), scene, memory, line, parameters, out)
+    beyond = np.flatnonzero(~np.isnan(out[size:]))
+    if len(beyond):
+        raise ValueError(
+            f"observation {observation.name!r} writes entry {size + beyond[0]}, but it has {size} features"
+        )
+
+
+@jit
+def write_features(address: int, scene: Any, memory: Any, line: np.ndarray, parameters: Any, out: np.ndarray) -> None:
+    """Write the features of an observation in their units; records come as 0-d arrays.
+
+    Args:
+        address: address of the observation's compiled function.
+        scene: record of :data:`records.SCENE`.
+        memory: record of :data:`records.MEMORY`.
+        line: reference line, shape (m, 6).
+        parameters: record of :class:`core.parameters.Parameters`.
+        out: written, float32, at least as many entries as features.
+    """
+    _write(address, scene[()], memory[()], line, parameters[()], out)
 
 
 @jit
@@ -154,6 +187,8 @@ def observe(
         p: parameters.
         out: observation [-], written, float32, shape (n,).
     """
+    for i in range(out.shape[0]):
+        out[i] = 0.0  # for what the observation leaves out
     _write(address, scene, memory, line, p, out)
     for i in range(out.shape[0]):
         out[i] = min(max(out[i] / scales[i], -1.0), 1.0)

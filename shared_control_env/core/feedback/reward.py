@@ -12,6 +12,7 @@ from shared_control_env.core.compile.calls import Interface, by_value
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import Scene, Signals, Transition
+from shared_control_env.nearest import check_new_name
 
 COMFORT_JERK = 5.0
 """Jerk at which the comfort term saturates [m/s^3]: the average limit of ISO 11270 over half a second."""
@@ -126,8 +127,7 @@ def add_term(term: Term) -> None:
     Raises:
         ValueError: if the name is taken, or if numba cannot compile the function.
     """
-    if term.name in TERMS:
-        raise ValueError(f"reward term {term.name!r} is there already")
+    check_new_name("reward term", term.name, TERMS)
     VALUE.address(term.value)
     TERMS[term.name] = term
 

@@ -67,7 +67,8 @@ def name_in(table: Mapping[str, Any], *but: str) -> Any:
         names = [each for each in table if each not in but]
         if name not in names:
             expected = ", ".join(map(repr, names))
-            raise PydanticCustomError("literal_error", "input should be one of {expected}", {"expected": expected})
+            text = "input should be one of {expected}" if names else "there is none to name; add one first"
+            raise PydanticCustomError("literal_error", text, {"expected": expected})
         return name
 
     return Annotated[str, AfterValidator(check)]

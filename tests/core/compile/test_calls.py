@@ -40,6 +40,16 @@ def test_what_numba_cannot_compile_is_refused_by_name():
         Interface(float, float).address(half)
 
 
+def test_a_function_that_raises_is_refused():
+    def positive(x):
+        if x < 0.0:
+            raise ValueError
+        return x
+
+    with pytest.raises(ValueError, match="positive raises errors"):
+        Interface(float, float).address(positive)
+
+
 def test_a_function_is_compiled_once_and_called_by_its_address():
     interface = Interface(float, float)
     call = interface.call

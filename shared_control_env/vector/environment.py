@@ -465,9 +465,10 @@ class SharedControlVectorEnv(VectorEnv):
         finally:
             self._observations = out.observations.copy()
             self._pictures.note(out.infos, active, self._batch)
-        wrong = np.flatnonzero(active & np.isnan(out.infos["alpha_a"]))
-        if len(wrong):
-            raise ValueError(f"the allocator gave environment {wrong[0]} alpha_a = nan; it must be in [0, 1]")
+        if self._allocate not in (None, fuzzy_authority):
+            wrong = np.flatnonzero(active & np.isnan(out.infos["alpha_a"]))
+            if len(wrong):
+                raise ValueError(f"the allocator gave environment {wrong[0]} alpha_a = nan; it must be in [0, 1]")
         return result
 
     def _advance(self, steps: int, active: np.ndarray, autoreset: bool, actions: Actions, out: Outputs) -> Rollout:

@@ -193,7 +193,7 @@ def as_batch(records: np.ndarray, mask: np.ndarray, terms: Sequence[str] = ()) -
         if field.dtype.names:
             values[name] = as_batch(field, mask)
         elif name == "rewards":
-            values[name] = _masked({term: field[:, i].copy() for i, term in enumerate(terms)}, mask)
+            values[name] = _masked({term: field[:, i] for i, term in enumerate(terms)}, mask)
         else:
             values[name] = field
     return _masked(values, mask)

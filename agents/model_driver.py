@@ -9,6 +9,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.save_util import load_from_zip_file
 
+from shared_control_env.controllers.stateless import Stateless
 from shared_control_env.core.feedback.observation import DRIVER_V0
 from shared_control_env.core.parameters import Limits
 
@@ -16,7 +17,7 @@ ALGORITHMS: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC, "td3": TD3
 """Supported algorithms by name."""
 
 
-class ModelDriver:
+class ModelDriver(Stateless):
     """A model that was trained on the environment's own observations, as the README shows.
 
     Args:
@@ -61,13 +62,6 @@ class ModelDriver:
             if made_by in algorithm.policy_aliases.values():
                 return algorithm.load(path, device="cpu")
         raise ValueError(f"{path} holds a {made_by.__name__}; the known policies are those of {', '.join(ALGORITHMS)}")
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the driver has no state and draws no random numbers.
-
-        Args:
-            seed: not used.
-        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired acceleration and steering [m/s^2, rad], shape (2,).

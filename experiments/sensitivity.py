@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.progress import track
 
 from experiments import style
+from shared_control_env.controllers.stateless import Stateless
 from shared_control_env.core.authority import fuzzy
 from shared_control_env.core.parameters import (
     DriverLagParameters,
@@ -35,7 +36,7 @@ METRICS = ("lateral_max", "min_gap", "authority_min", "driver_effort", "conflict
 """Metrics of the table."""
 
 
-class WarpedFuzzyAuthority:
+class WarpedFuzzyAuthority(Stateless):
     """The fuzzy inference with moved breakpoints of the membership functions of its inputs.
 
     The inner breakpoints move from (1/4, 1/2, 3/4) to these values to the power of 1/g.
@@ -49,13 +50,6 @@ class WarpedFuzzyAuthority:
 
     def __init__(self, exponent: float) -> None:
         self.exponent = exponent
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the allocator has no state.
-
-        Args:
-            seed: not used.
-        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """alpha_a of one step.

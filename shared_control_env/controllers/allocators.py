@@ -9,6 +9,7 @@ import numpy as np
 
 from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.lead import lead_of
+from shared_control_env.controllers.stateless import Stateless
 from shared_control_env.core.authority import allocators as compiled_allocators
 from shared_control_env.core.authority.fuzzy import OPERATORS, authority
 from shared_control_env.nearest import hint
@@ -64,7 +65,7 @@ def checked_authority(alpha_a: Any, who: str = "allocator") -> float:
     return array.item()
 
 
-class FuzzyAuthority:
+class FuzzyAuthority(Stateless):
     """The paper's fuzzy inference, ``alpha_a = FIS(r_x, r_y)`` (Eq. 9).
 
     Args:
@@ -81,13 +82,6 @@ class FuzzyAuthority:
         self.operators = operators
         self.compiled = compiled_allocators.FUZZY[operators]
 
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the allocator has no state.
-
-        Args:
-            seed: not used.
-        """
-
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """alpha_a of one step.
 
@@ -98,7 +92,7 @@ class FuzzyAuthority:
         return authority(float(signals["r_x"]), float(signals["r_y"]), OPERATORS.index(self.operators))
 
 
-class FixedAuthority:
+class FixedAuthority(Stateless):
     """A constant authority.
 
     Args:
@@ -107,13 +101,6 @@ class FixedAuthority:
 
     def __init__(self, alpha: float = 0.5) -> None:
         self.alpha = alpha
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the allocator has no state.
-
-        Args:
-            seed: not used.
-        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """The constant authority.
@@ -130,15 +117,8 @@ def _risk(signals: np.ndarray) -> float:
     return max(float(signals["r_x"]), float(signals["r_y"]))
 
 
-class LinearAuthority:
+class LinearAuthority(Stateless):
     """Authority that falls linearly with the larger risk, ``alpha_a = 1 - max(r_x, r_y)``."""
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the allocator has no state.
-
-        Args:
-            seed: not used.
-        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """alpha_a of one step.
@@ -150,7 +130,7 @@ class LinearAuthority:
         return 1.0 - _risk(signals)
 
 
-class SoftmaxAuthority:
+class SoftmaxAuthority(Stateless):
     """Softmax of the automation's risk r against an accepted risk r_0.
 
     ``alpha_a = e^(-r/T) / (e^(-r/T) + e^(-r_0/T))`` with ``r = max(r_x, r_y)``.
@@ -162,13 +142,6 @@ class SoftmaxAuthority:
 
     def __init__(self, accepted: float = 0.5, temperature: float = 0.1) -> None:
         self.accepted, self.temperature = accepted, temperature
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the allocator has no state.
-
-        Args:
-            seed: not used.
-        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """alpha_a of one step.
@@ -223,7 +196,7 @@ class HardTakeover:
         return 0.0 if self._taken else 1.0
 
 
-class TimeBasedAuthority:
+class TimeBasedAuthority(Stateless):
     """Authority from the time to the vehicle ahead and to the edge of the lane.
 
     ``alpha_a = (T - T_low) / (T_high - T_low)``, clipped to [0, 1]. T is the smaller of the time to collision and the
@@ -239,13 +212,6 @@ class TimeBasedAuthority:
 
     def __init__(self, low: float = 0.5, high: float = 2.0, horizon: float = 0.5, lane_width: float = 4.0) -> None:
         self.low, self.high, self.horizon, self.lane_width = low, high, horizon, lane_width
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the allocator has no state.
-
-        Args:
-            seed: not used.
-        """
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """alpha_a of one step.

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from shared_control_env.controllers.driver import Driver
+from shared_control_env.controllers.stateless import Stateless
 
 COLUMNS = "t,a,delta"
 """Header of a recording: time [s], desired acceleration [m/s^2] and front steering angle [rad]."""
 
 
-class RecordedDriver:
+class RecordedDriver(Stateless):
     """Replays recorded commands at their times in the episode, interpolated linearly and held beyond both ends.
 
     The commands depend on time only, not on the road. A recording therefore suits the episode in which it was made, or
@@ -50,13 +51,6 @@ class RecordedDriver:
         if header != COLUMNS:
             raise ValueError(f"{path} begins with {header!r}; a recording begins with {COLUMNS!r}")
         return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the driver has no state.
-
-        Args:
-            seed: not used.
-        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Recorded command at the scene's time [m/s^2, rad], shape (2,).

@@ -7,10 +7,11 @@ from math import atan2, exp, inf
 import numpy as np
 
 from shared_control_env.controllers.lead import lead_of
+from shared_control_env.controllers.stateless import Stateless
 from shared_control_env.core.world.traffic import idm_acceleration
 
 
-class ScriptedDriver:
+class ScriptedDriver(Stateless):
     """Steers by Stanley's law, and keeps speed and distance by the Intelligent Driver Model.
 
     ``delta = L kappa - psi - atan(k y / (v + v_0))`` at the centre of mass, with the road's curvature as feedforward
@@ -30,13 +31,6 @@ class ScriptedDriver:
     ) -> None:
         self.gain, self.softening = gain, softening
         self.speed_gain, self.wheelbase = speed_gain, wheelbase
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the driver has no state and draws no random numbers.
-
-        Args:
-            seed: not used.
-        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired acceleration and steering [m/s^2, rad], shape (2,).
@@ -68,11 +62,10 @@ class DistractedDriver:
         reaction: time from then until awareness begins to rise [s]; take-over times of 1 to 3 s are usual (Eriksson &
             Stanton, Takeover Time in Highly Automated Vehicles, Human Factors 2017, report 1.9 to 25.7 s).
         recovery: time constant of awareness [s].
-        dt: time step [s].
     """
 
-    def __init__(self, notice: float = 0.9, reaction: float = 1.0, recovery: float = 0.7, dt: float = 0.05) -> None:
-        self.notice, self.reaction, self.recovery, self.dt = notice, reaction, recovery, dt
+    def __init__(self, notice: float = 0.9, reaction: float = 1.0, recovery: float = 0.7) -> None:
+        self.notice, self.reaction, self.recovery = notice, reaction, recovery
         self._attentive = ScriptedDriver()
         self.reset()
 
@@ -99,7 +92,7 @@ class DistractedDriver:
         return w * self._attentive.act(observation, scene) + (1.0 - w) * scene["felt"]
 
 
-class OverreactingDriver:
+class OverreactingDriver(Stateless):
     """Driver whose command is a multiple of the scripted driver's command.
 
     Args:
@@ -109,13 +102,6 @@ class OverreactingDriver:
     def __init__(self, excess: float = 2.5) -> None:
         self.excess = excess
         self._calm = ScriptedDriver()
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the driver has no state and draws no random numbers.
-
-        Args:
-            seed: not used.
-        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired acceleration and steering [m/s^2, rad], shape (2,).
@@ -127,7 +113,7 @@ class OverreactingDriver:
         return self.excess * self._calm.act(observation, scene)
 
 
-class FightingDriver:
+class FightingDriver(Stateless):
     """Driver who opposes the automation wherever its command differs from what the driver wants.
 
     ``u_h,des = u + stubbornness (u - u_felt)``, where u is the scripted driver's command and u_felt is the
@@ -140,13 +126,6 @@ class FightingDriver:
     def __init__(self, stubbornness: float = 1.0) -> None:
         self.stubbornness = stubbornness
         self._wish = ScriptedDriver()
-
-    def reset(self, seed: int | None = None) -> None:
-        """Do nothing; the driver has no state and draws no random numbers.
-
-        Args:
-            seed: not used.
-        """
 
     def act(self, observation: np.ndarray, scene: np.ndarray) -> np.ndarray:
         """Desired acceleration and steering [m/s^2, rad], shape (2,).

@@ -365,13 +365,12 @@ def look(
 
 
 @jit
-def search_among(triangles: np.ndarray, batch: Batch, works: np.ndarray, scratch: Scratch) -> None:
+def search_among(triangles: np.ndarray, batch: Batch, scratch: Scratch) -> None:
     """Find the safe area of environment 0 from any number of triangles.
 
     Args:
         triangles: triangles of :func:`triangulation.triangulate_any`, vertices (s, d) [m], shape (n, 3, 2).
         batch: state of all environments; the safe area of environment 0 is written.
-        works: records of :data:`batch.WORK`, unused.
         scratch: scratch for at least n triangles.
     """
     e = environment(0, batch)

@@ -223,8 +223,7 @@ class SharedControlEnv(HighwayEnv):
 
     def _reset(self) -> None:
         """Draw the settings of the episode, and create road, vehicles and controllers from them."""
-        if self._calls == NOT_LOADED:  # first, since it waits for a process that compiles what is needed below
-            self._calls = load(False, None, self._observation)
+        self._load()  # first, since it waits for a process that compiles what is needed below
         settings = self.episode = draw_episode(self.settings, self.np_random)
         start = start_of(settings)
         self._batch = empty_batch(1, Sizes(len(start.faults), len(start.line), len(start.traffic)))
@@ -239,11 +238,9 @@ class SharedControlEnv(HighwayEnv):
             neighbour_vehicles_connected_lanes=settings.neighbour_vehicles_connected_lanes,
         )
         self._place_vehicles()
+        self._outputs = new_outputs(1, self._observation.size)
         self._bind()
         self._path = np.zeros((settings.steps + 1, 2))
-        given = self._given_automation
-        memory = self._batch.automations.reshape(())
-        self._automation = Automation(self.parameters, memory) if given is None else given
         self._automation.reset()
 
     def _place_vehicles(self) -> None:
@@ -261,7 +258,10 @@ class SharedControlEnv(HighwayEnv):
             self.road.vehicles.append(vehicle)
 
     def _bind(self) -> None:
-        """Make the arrays of the vehicles views of the batch. Needed after a reset, a copy, or a change of vehicles."""
+        """Make vehicles and automation views of the batch, and set up the step.
+
+        Needed after a reset, a copy, or a change of vehicles.
+        """
         ego = self.vehicle
         others = [vehicle for vehicle in self.road.vehicles if vehicle is not ego]
         batch = self._batch
@@ -282,13 +282,10 @@ class SharedControlEnv(HighwayEnv):
         self._corners = np.zeros((len(others), 4, 2))
         self.road.rows = np.zeros((0, 8))
         self._bound = [ego, *self.road.vehicles]
+        given = self._given_automation
+        self._automation = Automation(self.parameters, batch.automations.reshape(())) if given is None else given
         self._load()
-
-    def _load(self) -> None:
-        """Set up the step, and load or compile all functions that it calls."""
         settings = self.episode
-        if self._calls == NOT_LOADED:
-            self._calls = load(False, None, self._observation)
         self._setup = Setup(
             starts=empty_starts(0, Sizes(0, 0, 0)),  # the batch already holds the start
             steps=settings.steps,
@@ -297,7 +294,11 @@ class SharedControlEnv(HighwayEnv):
             calls=self._calls,
             scales=self._observation.scales,
         )
-        self._outputs = new_outputs(1, self._observation.size)
+
+    def _load(self) -> None:
+        """Load or compile all functions that a step calls, unless this was done before."""
+        if self._calls == NOT_LOADED:
+            self._calls = load(False, None, self._observation)
 
     def _run_kernel(self) -> None:
         """Run one step of the kernel on the batch of size one."""
@@ -381,7 +382,7 @@ class SharedControlEnv(HighwayEnv):
         count = kernel.look(k, resetting, batch, setup, out, works, self._corners)
         if count > MAX_HOLES:
             triangles = triangulate_any(self.scene["region"], self._corners[:count])
-            kernel.search_among(triangles, batch, works, new_scratch(len(triangles)))
+            kernel.search_among(triangles, batch, new_scratch(len(triangles)))
         if given is not None:
             kernel.show_automation(batch, works)
             solution = self._decided(given.act(works["automation_view"][:1].reshape(())))
@@ -544,8 +545,7 @@ class SharedControlEnv(HighwayEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling, without what belongs to this process: viewer, recorder and function addresses."""
-        process = {"viewer": None, "_record_video_wrapper": None, "_calls": NOT_LOADED, "_bound": None}
-        return {**self.__dict__, **process}
+        return {**self.__dict__, "viewer": None, "_record_video_wrapper": None, "_calls": NOT_LOADED}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Continue from the state of the pickled or copied environment.

@@ -171,7 +171,10 @@ def test_the_vehicles_of_a_copy_are_those_it_drives(traffic):
             each.step(action)
     for twin in (copy.deepcopy(env), pickle.loads(pickle.dumps(env))):
         before = [vehicle.position.copy() for vehicle in env.road.vehicles]
+        assert twin._reward(action) == env._reward(action) != 0.0
         twin.step(action)
+        decided = [copy.deepcopy(each).automation.act(each.scene).command for each in (twin, ahead)]
+        np.testing.assert_array_equal(*decided)  # the automation goes on from its last command
         for vehicle, moved in zip(twin.road.vehicles, ahead.road.vehicles, strict=True):
             np.testing.assert_array_equal(vehicle.position, moved.position)
         for vehicle, position in zip(env.road.vehicles, before, strict=True):

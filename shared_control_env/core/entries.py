@@ -11,16 +11,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from shared_control_env.core.compile.jit import jit
-from shared_control_env.core.control import driver, driver_lag, person
-from shared_control_env.core.control.automation import AUTOMATE
-from shared_control_env.core.control.automation import clear_automation as forget
-from shared_control_env.core.world import traffic as vehicles
+from shared_control_env.core.control import automation, driver, driver_lag, person
+from shared_control_env.core.world import traffic as traffic_model
 from shared_control_env.core.world import vehicle
 
 Boxed: TypeAlias = Any
 """A record held in a 0-d array."""
 
-_automate = AUTOMATE.call
+_automate = automation.AUTOMATE.call
 
 
 @jit
@@ -58,7 +56,7 @@ def decide_acceleration(
         line: reference line, shape (m, 6).
         lane_width: width of a lane [m].
     """
-    vehicles.decide_acceleration(row, plan[()], t, ego, traffic, line, lane_width)
+    traffic_model.decide_acceleration(row, plan[()], t, ego, traffic, line, lane_width)
 
 
 @jit
@@ -72,7 +70,7 @@ def move_along(row: np.ndarray, plan: Boxed, line: np.ndarray, t: float, dt: flo
         t: time [s].
         dt: step [s].
     """
-    vehicles.move_along(row, plan[()], line, t, dt)
+    traffic_model.move_along(row, plan[()], line, t, dt)
 
 
 @jit
@@ -82,7 +80,7 @@ def clear_automation(memory: Boxed) -> None:
     Args:
         memory: record of :data:`records.AUTOMATION_MEMORY`, a 0-d array, overwritten.
     """
-    forget(memory[()])
+    automation.clear_automation(memory[()])
 
 
 @jit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Annotated, Any
 
@@ -189,19 +189,21 @@ def as_batch(records: np.ndarray, mask: np.ndarray, terms: Sequence[str] = ()) -
     """
     values: dict[str, Any] = {}
     for name in records.dtype.names or ():
-        field = records[name]
+        field: Any = records[name]
         if field.dtype.names:
-            values[name] = as_batch(field, mask)
+            field = as_batch(field, mask)
         elif name == "rewards":
-            values[name] = _masked({term: field[:, i] for i, term in enumerate(terms)}, mask)
-        else:
-            values[name] = field
-    return _masked(values, mask)
+            field = _by_term(field, mask, terms)
+        values[name], values[f"_{name}"] = field, mask
+    return values
 
 
-def _masked(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:
-    """Dict with every entry followed by the mask."""
-    return {key: value for name, entry in values.items() for key, value in ((name, entry), (f"_{name}", mask))}
+def _by_term(rewards: np.ndarray, mask: np.ndarray, terms: Sequence[str]) -> dict[str, Any]:
+    """Columns of the reward's terms, shape (N, MAX_TERMS), by name, each followed by the mask."""
+    values: dict[str, Any] = {}
+    for i, term in enumerate(terms):
+        values[term], values[f"_{term}"] = rewards[:, i], mask
+    return values
 
 
 def _named(values: tuple[Any, ...], dtype: np.dtype) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.core.compile.jit import jit, jit_inlined
-from shared_control_env.core.control import automation
 from shared_control_env.core.control.qp.active_set import solve_qp
 from shared_control_env.core.faults.command import degrade
 from shared_control_env.core.risk import assessment
@@ -42,18 +41,6 @@ def monitor(scene: Any, traffic: Any, line: Any, faults: Any, memories: Any, par
     s, p, g = scene[()], parameters[()], signals[()]
     degrade(g.u_a_des, s.k, p.task.dt, faults, memories, p.limits, g.u_a_f)
     assess_risk(s, traffic, line, p, g)
-
-
-@jit
-def solve_automation(U: Any, scene: Any, parameters: Any, iterations: int, work: Any) -> tuple[int, int, float, float]:
-    """:func:`control.automation.solve`."""
-    return automation.solve(U, scene[()], parameters[()], iterations, work[()])
-
-
-@jit
-def automation_cost(U: Any, scene: Any, parameters: Any, work: Any) -> float:
-    """:func:`control.automation.cost`."""
-    return automation.cost(U, scene[()], parameters[()], work[()])
 
 
 @jit

@@ -39,6 +39,8 @@ REFUSED = {
     "kind without a name": (lambda: add_kind(Kind("", SHARE, act=halve)), "name"),
     "kind that does nothing": (lambda: add_kind(Kind("idle", SHARE)), "give it act or perceive"),
     "kind that heeds what is not set": (lambda: add_kind(Kind("half", SHARE, act=halve, heeds=("sed",))), "'seed'"),
+    "kind that heeds a text": (lambda: add_kind(Kind("half", SHARE, act=halve, heeds="seed")), "must be a tuple"),
+    "kind of no channel": (lambda: add_kind(Kind("half", SHARE, act=halve, channels=())), "no channels"),
     "kind of an unknown channel": (lambda: add_kind(Kind("half", SHARE, act=halve, channels=("brake",))), "channels"),
     "observation beyond its features": (lambda: add_observation(Observation("b", ONE, ninth_entry)), "entry 8"),
     "observation without features": (lambda: add_observation(Observation("b", (), first_entry)), "feature"),

@@ -1,9 +1,9 @@
 """The kernel: runs the loop of many independent environments, which several threads share among them.
 
 A single environment is a batch of size one. :func:`advance` makes whole time steps in compiled code. Some steps need
-Python in between: those with a user-defined automation, with highway-env's own vehicles, or with more vehicles in the
-driving region than the compiled triangulation accepts. For these, Python calls the parts of a step one after the other:
-:func:`respond`, :func:`look`, :func:`judge`, :func:`finish`.
+Python in between: those with a user-defined automation, with highway-env's own vehicles, with more than MAX_HOLES
+other vehicles, or while every simulation step is recorded. For these, Python calls the parts of a step one after the
+other: :func:`respond`, :func:`look`, :func:`search_among`, :func:`show_automation`, :func:`judge`, :func:`finish`.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def begin(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
     clear_memory(batch.memories[i])
     clear_automation(batch.automations[i])
     clear_signals(batch.signals[i])
-    clear_transition(batch.transitions[i], True)
+    clear_transition(batch.transitions[i])
     clear_report(batch.parameters[i].person.engaged, out.drivers[i])
 
 
@@ -161,7 +161,7 @@ def write_outputs(i: int, resetting: bool, e: Environment, setup: Setup, out: Ou
     """
     if resetting:
         note(i, e, out)
-        clear_transition(e.transition, is_on_road(e.scene, e.p))
+        e.transition.on_road = is_on_road(e.scene, e.p)
         out.rewards[i] = 0.0
         out.terminations[i] = out.truncations[i] = False
     else:

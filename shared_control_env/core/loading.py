@@ -30,7 +30,7 @@ from shared_control_env.core.risk.finding import SEARCH, TRIANGULATE, search, tr
 from shared_control_env.core.world.motion import MOVE, move
 
 _CALLED = ((AUTOMATE, automate), (SEARCH, search), (TRIANGULATE, triangulate), (ASSESS, assess))
-"""Functions that every step calls by address, and their interfaces; the slowest to compile come first."""
+"""The large functions of every step, with their interfaces. Either process compiles them, the slowest first."""
 
 
 _other: OtherProcess | None = None

@@ -293,14 +293,13 @@ def clear_signals(signals: Signals) -> None:
 
 
 @jit
-def clear_transition(transition: Transition, on_road: bool) -> None:
+def clear_transition(transition: Transition) -> None:
     """Reset the transition at the start of an episode: no collision, no failure, all reward terms zero.
 
     Args:
-        transition: record of :data:`records.TRANSITION`, overwritten.
-        on_road: whether the ego's centre lies between the edges of the road.
+        transition: record of :data:`records.TRANSITION`, overwritten up to ``previous_s`` and ``last_a``.
     """
     transition.crashed = transition.failed = False
-    transition.on_road = on_road
+    transition.on_road = True
     for i in range(transition.terms.shape[0]):
         transition.terms[i] = 0.0

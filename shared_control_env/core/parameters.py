@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from annotated_types import Interval
 
-from shared_control_env.core.records import MAX_TERMS
+from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, MAX_TERMS
 
 FASTEST = 60.0
 """Highest speed that can be set [m/s]: 1.5 times the speed up to which the model is valid."""
@@ -48,7 +48,7 @@ Stiffness = Annotated[float, Interval(ge=1e3, le=1e7)]  # [N/rad]
 
 
 class VehicleParameters(NamedTuple):
-    """Three-degree-of-freedom bicycle with linear tyres (Eq. 11).
+    """Three-degree-of-freedom bicycle (Eq. 11), by default with linear tyres.
 
     Attributes:
         m: mass [kg]; paper, Table III.
@@ -109,8 +109,8 @@ class PredictiveParameters(NamedTuple):
         R: weight of the potential-field value squared [-]; ours (automation only).
     """
 
-    H_p: Annotated[int, Interval(ge=1, le=30)] = 10
-    H_c: Annotated[int, Interval(ge=1, le=10)] = 3
+    H_p: Annotated[int, Interval(ge=1, le=MAX_HORIZON)] = 10
+    H_c: Annotated[int, Interval(ge=1, le=MAX_CONTROL)] = 3
     W: Weight = 1.0
     H: Weight = 0.1
     N: Weight = 0.01

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from shared_control_env.core.faults.kinds import KINDS
+from shared_control_env.core.faults.kinds import CHANNELS, KINDS
 from shared_control_env.core.parameters import Limits
 from shared_control_env.nearest import check_new_name, hint
 
@@ -42,8 +42,6 @@ class Degradation(NamedTuple):
     period: Range = (0.0, 0.0)
 
 
-_ALL = ("steering", "acceleration", "both")
-
 DEGRADATIONS: dict[str, Degradation | None] = {
     "none": None,
     "bias_ramp": Degradation(
@@ -56,18 +54,18 @@ DEGRADATIONS: dict[str, Degradation | None] = {
     ),
     "step_bias": Degradation("bias that is there at once", "bias", size=(0.05, 0.4), of_limit=True, signed=True),
     "loss_of_effectiveness": Degradation(
-        "a share of the command is lost", "loss_of_effectiveness", _ALL, size=(0.3, 0.9), ramp=(0.0, 1.0)
+        "a share of the command is lost", "loss_of_effectiveness", CHANNELS, size=(0.3, 0.9), ramp=(0.0, 1.0)
     ),
-    "stuck": Degradation("locked in place at the command of the onset", "stuck", _ALL),
+    "stuck": Degradation("locked in place at the command of the onset", "stuck", CHANNELS),
     "rate_limit": Degradation("the command changes slowly", "rate_limit", size=(0.02, 0.2), of_limit=True),
-    "saturation": Degradation("the command's range shrinks", "saturation", _ALL, size=(0.7, 0.98), ramp=(0.0, 1.0)),
-    "delay": Degradation("the command comes late", "delay", _ALL, size=(0.1, 0.6), ramp=(0.0, 1.0)),
+    "saturation": Degradation("the command's range shrinks", "saturation", CHANNELS, size=(0.7, 0.98), ramp=(0.0, 1.0)),
+    "delay": Degradation("the command comes late", "delay", CHANNELS, size=(0.1, 0.6), ramp=(0.0, 1.0)),
     "white_noise": Degradation("white noise on the command", "white_noise", size=(0.05, 0.3), of_limit=True),
     "coloured_noise": Degradation(
         "noise of 0.5 s correlation time on the command", "coloured_noise", size=(0.05, 0.4), of_limit=True
     ),
     "oscillation": Degradation("oscillation of 0.5 Hz on the command", "oscillation", size=(0.05, 0.4), of_limit=True),
-    "drop_out": Degradation("the command is zero for a while", "drop_out", _ALL, duration=(0.5, 2.0)),
+    "drop_out": Degradation("the command is zero for a while", "drop_out", CHANNELS, duration=(0.5, 2.0)),
     "intermittent": Degradation(
         "bias that comes and goes", "bias", size=(0.1, 0.5), of_limit=True, signed=True, period=(0.6, 2.0)
     ),

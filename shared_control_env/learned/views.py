@@ -135,7 +135,7 @@ def view(task: str, observations: np.ndarray, scenes: np.ndarray, signals: np.nd
     """Input of a policy: :func:`driver_view` or :func:`allocator_view`, depending on the task.
 
     Args:
-        task: key of :data:`agents.tasks.TASKS`.
+        task: key of :data:`FEATURES_OF`.
         observations: as in :func:`driver_view`.
         scenes: as in :func:`allocator_view`.
         signals: as in :func:`allocator_view`.

@@ -1,7 +1,7 @@
 """Numba's disk cache, with a separate folder for every state of the sources.
 
 Numba checks only whether a function's own file has changed. The machine code, however, also contains functions from
-other files. The digest of all compiled sources is therefore part of the path of the cache. A process that still runs
+other files. The digest of the core's sources is therefore part of the path of the cache. A process that still runs
 older sources writes to another folder. A cache that is damaged or cannot be written only costs time and produces one
 line on stderr.
 """
@@ -28,18 +28,15 @@ from numba.core.caching import (
     UserWideCacheLocator,
 )
 
-_PACKAGE = Path(__file__).parent.parent.parent
-
-COMPILED = ("core", "controllers", "vector")
-"""Subpackages that contain compiled functions; the digest covers all their sources, nested folders included."""
+_CORE = Path(__file__).parent.parent
+"""Folder of the compiled functions; the digest covers all its sources, nested folders included."""
 
 KEPT = 8
 """Number of states of the sources whose compiled functions are kept: the most recently used ones."""
 
 
 def _digest_of_sources() -> str:
-    paths = sorted(path for folder in COMPILED for path in (_PACKAGE / folder).rglob("*.py"))
-    return sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
+    return sha256(b"".join(path.read_bytes() for path in sorted(_CORE.rglob("*.py")))).hexdigest()
 
 
 FOLDER = f"shared_control_env-{_digest_of_sources()[:20]}"
@@ -158,11 +155,3 @@ def cache_of(function: Callable[..., Any]) -> Any:
     except (RuntimeError, OSError) as error:
         _say_uncached("no folder for them can be written to" if isinstance(error, RuntimeError) else error)
         return NullCache()
-
-
-def no_cache() -> Any:
-    """Cache that stores nothing, for functions outside this package.
-
-    Changes of such functions are not tracked, so they are compiled at every start.
-    """
-    return NullCache()

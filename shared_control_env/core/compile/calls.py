@@ -17,12 +17,13 @@ import numpy as np
 from llvmlite import ir
 from numba import from_dtype, types
 from numba.core import cgutils
+from numba.core.caching import NullCache
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError, TypingError
 from numba.extending import intrinsic
 
-from shared_control_env.core.compile.cache import cache_of, no_cache
-from shared_control_env.core.compile.jit import is_interpreted
+from shared_control_env.core.compile.cache import cache_of
+from shared_control_env.core.compile.jit import ARITHMETIC, is_interpreted
 from shared_control_env.core.records import record_dtype
 
 PACKAGE = __name__.partition(".")[0]
@@ -98,9 +99,8 @@ class Interface:
         plain: Any = getattr(function, "py_func", function)
         if not isinstance(plain, FunctionType):
             raise ValueError(f"{function!r} must be a function, defined by def, which numba compiles")
-        if any(each.opname in ("RAISE_VARARGS", "LOAD_ASSERTION_ERROR") for each in get_instructions(plain)):
-            raise ValueError(f"{plain.__qualname__} raises errors, which compiled code cannot pass on; return a number")
         if plain not in self._compiled:
+            _check_raises_nothing(plain)
             self._compiled[plain] = self._interpret(function) if is_interpreted() else self._compile(plain)
         return self._compiled[plain][0]
 
@@ -109,17 +109,24 @@ class Interface:
         return len(_interpreted) - 1, function
 
     def _compile(self, function: Callable[..., Any]) -> tuple[int, Any]:
-        options: Any = {"error_model": "numpy", "_nrt": False}  # the same as in core.compile.jit
+        options: Any = {**ARITHMETIC, "_nrt": False}
         signature = self._signature
         compiled: Any = CFunc(function, (signature.args, signature.return_type), locals={}, options=options)
         own = function.__module__.partition(".")[0] == PACKAGE
-        compiled._cache = cache_of(function) if own else no_cache()
+        # Changes of functions outside this package are not tracked, so they are compiled at every start.
+        compiled._cache = cache_of(function) if own else NullCache()
         try:
             compiled.compile()
         except (NumbaError, TypeError) as error:
             name = f"{function.__module__}.{function.__qualname__}"
             raise ValueError(f"{name} cannot be compiled: {error}") from None
         return compiled.address, compiled  # the object is kept, since its code would be freed otherwise
+
+
+def _check_raises_nothing(function: FunctionType) -> None:
+    """Raise ValueError for a function that raises or asserts: compiled code cannot pass errors on."""
+    if any(each.opname in ("RAISE_VARARGS", "LOAD_ASSERTION_ERROR") for each in get_instructions(function)):
+        raise ValueError(f"{function.__qualname__} raises errors, which compiled code cannot pass on; return a number")
 
 
 def _call_interpreted(address: int, *arguments: Any) -> Any:

@@ -11,6 +11,7 @@ import multiprocessing
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from typing import Any
 
 PATIENCE = 120.0
@@ -55,12 +56,8 @@ class OtherProcess:
 
     def wait(self) -> None:
         """Wait until it has ended, at most :data:`PATIENCE`."""
-        try:
+        with suppress(subprocess.TimeoutExpired):
             self._process.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
-            pass
-        finally:
-            self.end()
 
     def end(self) -> None:
         """End it if it runs."""

@@ -18,6 +18,9 @@ from shared_control_env.core.compile.cache import cache_of, say_once
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+ARITHMETIC = {"error_model": "numpy"}
+"""Numba's options of all compiled functions: divisions follow IEEE 754."""
+
 
 def jit(function: F) -> F:
     """Decorator: compile a function, with a disk cache.
@@ -54,11 +57,11 @@ def jit_inlined(function: F) -> F:
 
 def _compile(function: F, inline: str, allocating: bool = False) -> F:
     options: dict[str, Any] = {
-        "error_model": "numpy",
+        **ARITHMETIC,
         "nogil": True,
         "inline": inline,
         "no_cfunc_wrapper": True,
-        # No arrays are created in a step, so no reference counting is needed.
+        # Functions that create no arrays need no reference counting.
         "_nrt": allocating,
         # A private function is never called from Python, so it needs no wrapper for such calls.
         "no_cpython_wrapper": function.__name__.startswith("_"),

@@ -67,12 +67,15 @@ def clear_faults(memories: np.ndarray) -> None:
     """Reset the memories of all degradations at the start of an episode.
 
     Args:
-        memories: records of :data:`records.FAULT_MEMORY`, shape (n,). The fields not reset here are always written
-            before they are read.
+        memories: records of :data:`records.FAULT_MEMORY`, shape (n,), overwritten.
     """
     for i in range(memories.shape[0]):
-        memories[i].acting = False
-        memories[i].last[0] = memories[i].last[1] = 0.0
+        memory = memories[i]
+        memory.acting = False
+        for channel in range(2):
+            memory.kept[channel] = memory.noise[channel] = memory.last[channel] = 0.0
+            for j in range(MAX_DELAY):
+                memory.past[j, channel] = 0.0
 
 
 @jit

@@ -20,6 +20,9 @@ from shared_control_env.nearest import check_new_name, hint
 CHANNEL, RATE, SHARE, TIME, LENGTH = "channel", "rate", "share", "time", "length"
 """Units of a size: the channel's unit [m/s^2 or rad], the channel's unit per second, a share in [0, 1], [s], or [m]."""
 
+CHANNELS = ("steering", "acceleration", "both")
+"""Channels that the settings of a fault may name."""
+
 HEEDED = ("seed", "time_constant", "frequency")
 """Fields of a fault's settings that a kind may use beside its size."""
 
@@ -82,7 +85,7 @@ class Kind(NamedTuple):
     perceive: Callable[..., None] | None = None
     advance: Callable[..., None] | None = None
     heeds: tuple[str, ...] = ()
-    channels: tuple[str, ...] = ("steering", "acceleration", "both")
+    channels: tuple[str, ...] = CHANNELS
 
     @property
     def draws(self) -> bool:
@@ -198,19 +201,23 @@ def add_kind(kind: Kind) -> None:
         kind: the kind; its functions have the signatures that :class:`Kind` names, and are compiled here.
 
     Raises:
-        ValueError: if the name is taken, if the unit is unknown, if the kind has neither ``act`` nor ``perceive``, or
-            if numba cannot compile a function.
+        ValueError: if the name is taken, if the unit is unknown, if the kind has neither ``act`` nor ``perceive``, if
+            it heeds an unknown field or has no channel, or if numba cannot compile a function.
     """
     check_new_name("kind", kind.name, KINDS)
     if kind.unit not in (*UNITS, None):
         raise ValueError(f"kind {kind.name!r} has unit = {kind.unit!r}; {hint(kind.unit, UNITS)}")
     if kind.act is None and kind.perceive is None:
         raise ValueError(f"kind {kind.name!r} does nothing: give it act or perceive")
-    for field, valid in (("heeds", HEEDED), ("channels", ("steering", "acceleration", "both"))):
+    for field, valid in (("heeds", HEEDED), ("channels", CHANNELS)):
         given = getattr(kind, field)
-        wrong = [each for each in given if each not in valid] if isinstance(given, tuple | list) else [given]
+        if not isinstance(given, tuple | list):
+            raise ValueError(f"kind {kind.name!r} has {field} = {given!r}; it must be a tuple such as {valid[:1]}")
+        wrong = [each for each in given if each not in valid]
         if wrong:
             raise ValueError(f"kind {kind.name!r} has {field} = {given!r}; {hint(wrong[0], valid)}")
+    if not kind.channels:
+        raise ValueError(f"kind {kind.name!r} has no channels; {hint('', CHANNELS)}")
     addresses(kind)
     KINDS[kind.name] = kind
 

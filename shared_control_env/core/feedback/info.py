@@ -66,7 +66,7 @@ class Info:
         prediction_road: predicted position (s, d) in the road frame [m].
         safe_area_lower, safe_area_upper: boundaries of the safe area C, vertices (s, d) [m].
         safe_area_outcome: safe_area.REACHED or BLOCKED.
-        fault: change of the command that the degradations cause, u_a,f - u_a,des; ground truth.
+        fault: change of the command that the degradations cause, wherever they act; ground truth.
         misperception: the automation's lane offset [m], and 1 if it misses the preceding vehicle; ground truth.
         fault_active: whether any degradation has set in; ground truth.
         automation: outcome of the automation's solver.

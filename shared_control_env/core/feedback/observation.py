@@ -14,7 +14,7 @@ import numpy as np
 from shared_control_env.core.compile.calls import MATRIX, SINGLES, Interface
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import NEAR_D, NEAR_S, NEAR_SPEED, PRESENT, Memory, Scene, pack, record_dtype
+from shared_control_env.core.records import MEMORY, NEAR_D, NEAR_S, NEAR_SPEED, PRESENT, SCENE, Memory, Scene, pack
 from shared_control_env.core.world.road import curvature_at
 from shared_control_env.nearest import check_new_name, hint
 
@@ -147,7 +147,7 @@ def _check_writes(observation: Observation) -> None:
     """Raise ValueError if an observation writes more entries than it has features; that would be another's memory."""
     size = observation.size
     out = np.full(size + 1000, np.nan, dtype=np.float32)
-    scene, memory = np.zeros((), record_dtype(Scene)), np.zeros((), record_dtype(Memory))
+    scene, memory = np.zeros((), SCENE), np.zeros((), MEMORY)
     line, parameters = np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 100.0]]), pack(Parameters())
     write_features(WRITE.address(observation.write), scene, memory, line, parameters, out)
     beyond = np.flatnonzero(~np.isnan(out[size:]))

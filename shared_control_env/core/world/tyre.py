@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from shared_control_env.core.compile.calls import Interface
-from shared_control_env.nearest import check_new_name, hint
+from shared_control_env.nearest import check_new_name
 
 FORCE = Interface((float, float), float, float, float, float)
 """``force(slip, C, mu, F_z) -> force, slope``.
@@ -50,7 +50,5 @@ def address_of(name: str) -> int:
     Args:
         name: name of the tyre in :data:`TYRES`.
     """
-    if name not in TYRES:
-        raise ValueError(f"tyre {name!r} is not known in this program; {hint(name, TYRES)} (see add_tyre)")
     force = TYRES[name]
     return 0 if force is None else FORCE.address(force)

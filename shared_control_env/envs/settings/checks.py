@@ -141,7 +141,12 @@ def _check_faults(settings: Settings) -> None:
         _refuse_idle(name, fault, "seed", kind.draws, f"{fault.kind} draws nothing")
         _refuse_idle(name, fault, "duty", fault.period > 0.0, "it needs a 'period'")
         if fault.channel not in kind.channels:
-            raise ValueError(f"{name}['channel'] = {fault.channel!r}: {fault.kind} acts on no channel; leave it out")
+            why = (
+                "acts on no channel; leave it out"
+                if kind.act is None
+                else f"does not act on it; {hint(fault.channel, kind.channels)}"
+            )
+            raise ValueError(f"{name}['channel'] = {fault.channel!r}: {fault.kind} {why}")
         if kind.unit is None:
             continue
         if fault.size is None:

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from shared_control_env.core.control import automation as automation_mpc
+from benchmarks.controllers import automation_cost, solve_automation
+from shared_control_env.core.control import automation
 from shared_control_env.core.control.condensing import WORKSPACE
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import MAX_CONTROL, pack
 from shared_control_env.core.world.road import reference_line
-from tests import compiled
 from tests.scenes import STRAIGHT, random_state, scene_of
 
 VALUES = Parameters()
@@ -29,7 +29,7 @@ def scenes(count=N_STATES, line=STRAIGHT):
 
 def solve(scene, iterations, U=None):
     U = np.zeros((MAX_CONTROL, 2)) if U is None else U
-    return U, compiled.solve_automation(U, scene, PARAMETERS, iterations, np.zeros((), WORKSPACE))
+    return U, solve_automation(U, scene, PARAMETERS, iterations, np.zeros((), WORKSPACE))
 
 
 def slsqp(scene, start):
@@ -37,7 +37,7 @@ def slsqp(scene, start):
 
     def cost(x):
         U[:3] = x.reshape(3, 2) * SCALE
-        return compiled.automation_cost(U, scene, PARAMETERS, work)
+        return automation_cost(U, scene, PARAMETERS, work)
 
     options = {"ftol": 1e-13, "maxiter": 500}
     return minimize(cost, start, method="SLSQP", bounds=[(-1, 1)] * 6, options=options).fun
@@ -53,7 +53,7 @@ def test_cost_gap_to_slsqp_cold_and_warm():
     for scene in scenes():
         best = min(slsqp(scene, np.zeros(6)), solve(scene, 100)[1][3])
         _, (status, _, _, value) = solve(scene, VALUES.solver.first_iterations)
-        assert status != automation_mpc.FAILED
+        assert status != automation.FAILED
         cold.append(gap(value, best))
         # Warm: the solution of a state one step away, as in the loop.
         near = scene.copy()
@@ -118,13 +118,13 @@ def test_gradient_matches_finite_differences(line):
     for scene in scenes(20, line):
         U = np.zeros((MAX_CONTROL, 2))
         U[:3] = rng.uniform(-0.3, 0.3, (3, 2)) * SCALE
-        automation_mpc.linearise(U, scene[()], PARAMETERS[()], work[()])
+        automation.linearise(U, scene[()], PARAMETERS[()], work[()])
         gradient = 2.0 * work["gradient"][:6].copy()
         numeric = []
         for c in range(6):
             step = np.zeros((MAX_CONTROL, 2))
             step[c // 2, c % 2] = 1e-6
-            costs = [compiled.automation_cost(U + sign * step, scene, PARAMETERS, work) for sign in (1, -1)]
+            costs = [automation_cost(U + sign * step, scene, PARAMETERS, work) for sign in (1, -1)]
             numeric.append((costs[0] - costs[1]) / 2e-6)
         np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-5)
 
@@ -133,8 +133,8 @@ def test_respects_the_bounds_and_reports_stationarity():
     scene = scene_of(np.array([0.0, 1.5, 0.0, 25.0, 0.0, 0.0]), PARAMETERS)
     scene["v_target"] = 0.0
     U, (status, _, residual, _) = solve(scene, 100)
-    assert status == automation_mpc.CONVERGED
-    assert residual <= automation_mpc.TOLERANCE
+    assert status == automation.CONVERGED
+    assert residual <= automation.TOLERANCE
     assert np.abs(U / SCALE).max() <= 1.0 + 1e-12
     assert U[2, 0] == pytest.approx(-5.0)
 
@@ -148,4 +148,4 @@ def test_starts_off_from_standstill():
 def test_not_a_number_is_reported():
     scene = scene_of(np.zeros(6), PARAMETERS)
     scene["z"][1] = np.nan
-    assert solve(scene, 5)[1][0] == automation_mpc.FAILED
+    assert solve(scene, 5)[1][0] == automation.FAILED

@@ -196,3 +196,11 @@ def test_perception():
     for t, expected in ((0.5, (0.0, 0.0)), (1.5, (-0.75, 0.0)), (2.5, (-1.5, 1.0)), (3.5, (-1.5, 0.0))):
         misperceive(t, faults, signals)
         np.testing.assert_allclose(signals["misperception"], expected)
+
+
+def test_an_episode_begins_with_nothing_remembered():
+    memories = np.zeros(2, FAULT_MEMORY)
+    memories.view(np.uint8)[:] = 1
+    d.clear_faults(memories)
+    for name in FAULT_MEMORY.names:
+        assert not memories[name].any(), name

@@ -18,13 +18,11 @@ def _solve_free(
     bound: np.ndarray,
     factor: np.ndarray,
     solution: np.ndarray,
-) -> int:
+) -> None:
     """Minimise over the free variables, with the others held, by a Cholesky factorisation.
 
     The diagonal of ``factor`` holds the reciprocals of the Cholesky factor's diagonal, which avoids repeated divisions.
-
-    Returns:
-        Number of free variables; their values are written to ``solution``.
+    The values of the free variables are written to ``solution``.
     """
     m = 0
     for i in range(n):
@@ -50,7 +48,6 @@ def _solve_free(
         for q in range(k + 1, m):
             solution[k] -= factor[q, k] * solution[q]
         solution[k] *= factor[k, k]
-    return m
 
 
 @jit

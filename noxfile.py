@@ -1,6 +1,6 @@
 """The tests on every promised Python that this machine has; the others are named as missing.
 
-``nox`` runs what belongs to all of them; ``nox -s tests-3.12 -- tests/core`` runs a part on one.
+``nox`` runs all tests except ``tests/agents`` on each of them; ``nox -s tests-3.12 -- tests/core`` runs a part on one.
 """
 
 from __future__ import annotations

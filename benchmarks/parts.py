@@ -12,15 +12,14 @@ from numba import njit
 from benchmarks.timing import Timing, time_block
 from shared_control_env.core.authority import fuzzy
 from shared_control_env.core.batch import WORK, Batch, Setup
-from shared_control_env.core.control import automation as automation_mpc
-from shared_control_env.core.control import driver as driver_qp
+from shared_control_env.core.control import automation, driver
 from shared_control_env.core.control.predictive_driver import PROGRAM
 from shared_control_env.core.control.qp.active_set import solve_qp
 from shared_control_env.core.feedback import observation
 from shared_control_env.core.risk.assessment import ASSESS
 from shared_control_env.core.risk.finding import SEARCH, TRIANGULATE
 from shared_control_env.core.world import scene as scenes
-from shared_control_env.core.world import vehicle as dynamics
+from shared_control_env.core.world import vehicle
 
 triangulate, search, assess = TRIANGULATE.call, SEARCH.call, ASSESS.call
 
@@ -31,7 +30,7 @@ N = 256
 @njit
 def _automation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
-        automation_mpc.solve(batch.automations[i].U, batch.scenes[i], batch.parameters[i], 2, works[0].condensing)
+        automation.solve(batch.automations[i].U, batch.scenes[i], batch.parameters[i], 2, works[0].condensing)
 
 
 @njit
@@ -71,7 +70,7 @@ def _fuzzy(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) 
 def _dynamics(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         u = batch.signals[i].u
-        dynamics.plant_step(batch.states[i], u[0], u[1], setup.dt, batch.parameters[i].vehicle, works[0].motion.plant)
+        vehicle.plant_step(batch.states[i], u[0], u[1], setup.dt, batch.parameters[i].vehicle, works[0].motion.plant)
 
 
 @njit
@@ -87,7 +86,7 @@ def _driver(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray)
     g = programs[0]
     for i in range(batch.scenes.shape[0]):
         p = batch.parameters[i]
-        driver_qp.build_program(
+        driver.build_program(
             batch.scenes[i],
             batch.memories[i].u_h_des,
             batch.memories[i].u_h_act,
@@ -100,7 +99,7 @@ def _driver(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray)
             g.high,
         )
         n = 2 * p.driver.H_c + 1
-        m = driver_qp.count_rows(p)
+        m = driver.count_rows(p)
         solve_qp(n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set)
 
 

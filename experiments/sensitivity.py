@@ -14,7 +14,6 @@ import numpy as np
 import pandas as pd
 import typer
 from rich.console import Console
-from rich.progress import track
 
 from experiments import style
 from shared_control_env.controllers.stateless import Stateless
@@ -26,6 +25,7 @@ from shared_control_env.core.parameters import (
     VehicleParameters,
 )
 from shared_control_env.evaluation import AuthorityEntry, evaluate
+from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
 
 LAWS = ("paper", "proportional")
@@ -172,7 +172,8 @@ def as_markdown(table: pd.DataFrame) -> str:
 def main(out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results/sensitivity")) -> None:
     """Vary every parameter; writes sensitivity.csv, sensitivity.md and sensitivity.png."""
     console = Console()
-    parts = [measure(variation) for variation in track(variations(), "variations", console=console)]
+    with progress_bar(console) as bar:
+        parts = [measure(variation) for variation in bar.track(variations(), description="variations")]
     table = pd.concat(parts, ignore_index=True)
     write_atomically(out / "sensitivity.csv", partial(table.to_csv, index=False))
     write_atomically(out / "sensitivity.md", lambda path: path.write_text(as_markdown(table)))

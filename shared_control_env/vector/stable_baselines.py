@@ -155,7 +155,7 @@ class StableBaselinesVecEnv(VecEnv):
         raise ValueError(f"method {method_name!r} cannot be called: the environments share one kernel")
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper], indices: Any = None) -> list[bool]:
-        """False for every environment, because none is wrapped.
+        """False for every environment; Gymnasium's vector wrappers around all of them are not searched.
 
         Args:
             wrapper_class: ignored.

@@ -7,6 +7,7 @@ from importlib.metadata import version
 from typing import Any
 
 from agents.tasks import training_config
+from shared_control_env.evaluation.episodes import versions
 from shared_control_env.learned.history import HISTORY
 from shared_control_env.learned.views import DEAD_ZONE, FEATURES_OF
 
@@ -29,8 +30,6 @@ def card_of(
         hyperparameters: hyperparameters of the algorithm.
         libraries: distributions whose versions are stored in addition to the package's own versions.
     """
-    from shared_control_env.evaluation.episodes import versions  # needs pandas, which driving with a policy does not
-
     return {
         "algorithm": algorithm,
         "environments": list(ids),

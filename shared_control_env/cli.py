@@ -19,12 +19,12 @@ except ImportError:
 
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
+from shared_control_env.envs.settings import combined
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose_one
-from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS
+from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS, EpisodeBatch, settings_of
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import REPORT, TABLE
-from shared_control_env.vector.checks import checked_settings
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 COLUMNS = {
@@ -172,17 +172,20 @@ def replay(
     console = Console()
     place = None if video is None else _checked_video(video)
     with _in_words(console):
-        case = choose_one("scenario", scenario, SCENARIOS)
-        choose_one("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
         if source is None:
             first, second = choose_one("driver", driver, DRIVERS), choose_one("authority", authority, AUTHORITIES)
             config: Any = {}
             automation = None
         else:
+            # First of all, since what it imports may add the scenario or the degradation.
             first, second, config, automation = entries_of(source.expanduser(), driver, authority)
+        choose_one("scenario", scenario, SCENARIOS)
+        choose_one("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
         given = None if degradation == AS_GIVEN else degradation
         frames: list[Any] | None = None if video is None else []
         pair = (driver, first), (authority, second)
+        batch = EpisodeBatch(scenario, *pair, ((given, seed),), config, automation)
+        frequency = combined(SCENARIOS[scenario].settings, settings_of(batch, given)).policy_frequency
         measured = replay_episode(scenario, *pair, given, seed, frames, config, automation)
     title = f"{scenario}, {degradation}, {driver}, {authority}, seed {seed}"
     table = Table("metric", "value", "unit", title=escape(title))
@@ -190,7 +193,6 @@ def replay(
         table.add_row(name, f"{value:.4g}", METRICS[name].unit)
     console.print(table)
     if place is not None and frames is not None:
-        frequency = checked_settings(case, config, for_kernel=False).policy_frequency
         record(frames, place, frequency)
         console.print(f"The video is {video}.", markup=False)
 
@@ -216,7 +218,7 @@ def list_all() -> None:
     """Print the names of scenarios, degradations, drivers, authorities, suites and metrics."""
     console = Console()
     for title, entries in (
-        ("scenarios", {name: f"{case.description} ({case.id})" for name, case in SCENARIOS.items()}),
+        ("scenarios", {name: f"{entry.description} ({entry.id})" for name, entry in SCENARIOS.items()}),
         ("degradations", {name: entry.description if entry else "no fault" for name, entry in DEGRADATIONS.items()}),
         ("drivers", {name: driver.description for name, driver in DRIVERS.items()}),
         ("authorities", {name: authority.description for name, authority in AUTHORITIES.items()}),

@@ -130,6 +130,20 @@ def test_a_video_is_as_fast_as_the_drive(tmp_path):
     assert seconds == pytest.approx(2.0, abs=0.11)
 
 
+def test_a_video_is_as_fast_as_the_drive_of_its_driver_and_law(tmp_path):
+    import imageio_ffmpeg
+
+    from shared_control_env.evaluation import DriverEntry, evaluate
+
+    slow = DriverEntry("ten decisions a second", config={"policy_frequency": 10})
+    config = {"fault_at": "planner", "duration": 2.0}
+    evaluate({"slow": slow}, "proportional", config=config, out=tmp_path / "run")
+    options = ("--from", tmp_path / "run", "--scenario", "two_lane", "--driver", "slow", "--authority", "proportional")
+    assert run("replay", *options, "--video", tmp_path / "drive.mp4")[0] == 0
+    _, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "drive.mp4"))
+    assert seconds == pytest.approx(2.0, abs=0.11)
+
+
 def test_notices_are_lines(tmp_path):
     assert run(*ONE, "--out", tmp_path)[0] == 0
     (tmp_path / "episodes/mine.parquet").write_text("mine")

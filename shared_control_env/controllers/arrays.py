@@ -1,4 +1,4 @@
-"""Conversion of numbers that user code returns to NumPy arrays."""
+"""Arrays between the package and user code: numbers that user code returns, and views that it must not change."""
 
 from __future__ import annotations
 
@@ -28,3 +28,14 @@ def as_numbers(value: Any) -> np.ndarray:
         return np.asarray(as_array(value), dtype=float)
     except (TypeError, ValueError):
         return np.zeros(0)
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """A read-only view of an array.
+
+    Args:
+        array: the array, of any shape.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from math import isfinite
 from time import perf_counter
 from typing import Any, Protocol, runtime_checkable
@@ -52,6 +53,22 @@ class Driver(Protocol):
             ``u_h,des = [a, delta]`` [m/s^2, rad], shape (2,); the caller clips it to the limits.
         """
         ...
+
+
+def check_reset(player: Any, label: str) -> None:
+    """Check that the ``reset`` of a driver or an allocator takes a seed.
+
+    Args:
+        player: the driver or allocator.
+        label: name of the object for the error message.
+
+    Raises:
+        ValueError: if ``reset`` does not take a seed.
+    """
+    try:
+        inspect.signature(player.reset).bind(seed=0)
+    except TypeError:
+        raise ValueError(f"{label}: its reset must take a seed, as in reset(self, seed=None)") from None
 
 
 def checked_command(command: Any, who: str = "driver") -> np.ndarray:

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from shared_control_env.envs.scenarios import SCENARIOS, Scenario
-from shared_control_env.envs.settings import merge
+from shared_control_env.envs.settings import defaults
 from shared_control_env.envs.shared_control import SharedControlEnv
 
 
@@ -22,7 +22,7 @@ class ScenarioEnv(SharedControlEnv):
     @classmethod
     def default_config(cls) -> dict[str, Any]:
         """All settings, with the values of the scenario."""
-        return merge(super().default_config(), cls.scenario.settings)
+        return defaults(cls.scenario.settings)
 
 
 @cache

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from gymnasium import logger, spaces
 
-from shared_control_env.controllers.arrays import as_array
+from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.core.feedback.observation import Observation
 
 DRIVER, AUTHORITY = "driver", "authority"
@@ -21,7 +21,7 @@ SLOT_SPACES: dict[str, spaces.Box] = {
 """Space of each slot. ``driver``: u_h,des, desired acceleration and steering as shares of their limits [-].
 ``authority``: alpha_a [-]."""
 
-_BOUNDS = {name: (float(s.low[0]), float(s.high[0]), s.shape[0]) for name, s in SLOT_SPACES.items()}
+BOUNDS = {name: (float(s.low[0]), float(s.high[0]), s.shape[0]) for name, s in SLOT_SPACES.items()}
 
 
 def space_of(slots: tuple[str, ...]) -> spaces.Space:
@@ -94,7 +94,7 @@ class Clipping:
                 self._steps[slot][:] = 0
                 self.in_a_row[slot] = False
             return
-        low, high, _ = _BOUNDS[slot]
+        low, high, _ = BOUNDS[slot]
         steps = self._steps[slot]
         steps += 1
         steps[((values >= low - SLACK) & (values <= high + SLACK)).all(axis=1)] = 0
@@ -121,11 +121,8 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
     Raises:
         ValueError: if the shape is wrong or an entry is not finite.
     """
-    low, high, size = _BOUNDS[slot]
-    try:
-        array = np.array(value if isinstance(value, np.ndarray) else as_array(value), dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.full(0, np.nan)
+    low, high, size = BOUNDS[slot]
+    array = as_numbers(value)
     values = array.tolist()
     if array.shape != (size,) or not all(map(isfinite, values)):
         raise ValueError(
@@ -134,4 +131,4 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
     beyond = min(values) < low - SLACK or max(values) > high + SLACK
     if beyond or clipping.in_a_row[slot]:
         clipping.note(slot, array[None], beyond)
-    return array.clip(low, high, out=array)
+    return array.clip(low, high)

@@ -10,7 +10,7 @@ from shared_control_env.core.feedback import observation, reward
 from shared_control_env.core.world import tyre
 from shared_control_env.envs import degradations, scenarios
 from shared_control_env.evaluation import metrics
-from shared_control_env.evaluation.fingerprint import digest_of
+from shared_control_env.evaluation.fingerprint import fingerprint
 
 TABLES: dict[str, dict[str, Any]] = {
     "kinds": kinds.KINDS,
@@ -68,4 +68,4 @@ def described(added: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, str
     Returns:
         Digests by table and name.
     """
-    return {name: {key: digest_of(entry) for key, entry in entries.items()} for name, entries in added.items()}
+    return {name: {key: fingerprint(entry) for key, entry in entries.items()} for name, entries in added.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias, TypeVar
@@ -16,7 +15,7 @@ from shared_control_env.controllers.allocators import (
     TimeBasedAuthority,
 )
 from shared_control_env.controllers.automation import Planner
-from shared_control_env.controllers.driver import Driver
+from shared_control_env.controllers.driver import Driver, check_reset
 from shared_control_env.controllers.scripted import (
     DistractedDriver,
     FightingDriver,
@@ -221,7 +220,9 @@ def chosen_drivers(given: Drivers) -> dict[str, DriverEntry]:
         draws = made.draws if isinstance(made.draws, list | tuple) else (None,)
         if not all(isinstance(draw, Mapping) and isinstance(draw.get("setting"), str) for draw in draws):
             raise ValueError(f"driver {name!r} has draws = {made.draws!r}, which must be dicts with a 'setting' each")
-        _check_maker("driver", name, made.make, Driver, "reset(seed) and act(observation, scene)")
+        if made.make is not None:
+            driver = _check_maker(f"driver {name!r}", made.make, Driver, "reset(seed) and act(observation, scene)")
+            check_reset(driver, f"driver {name!r}")
         entries[name] = made._replace(config=as_plain(made.config), draws=tuple(as_plain(draws)))
     return entries
 
@@ -245,7 +246,9 @@ def chosen_authorities(given: Authorities) -> dict[str, AuthorityEntry]:
         )
         if made.law not in LAWS:
             raise ValueError(f"authority {name!r} has law = {made.law!r}; {hint(made.law, LAWS)}")
-        _check_maker("authority", name, made.make, Allocator, "reset(seed) and allocate(scene, signals)")
+        if made.make is not None:
+            label = f"authority {name!r}"
+            check_reset(_check_maker(label, made.make, Allocator, "reset(seed) and allocate(scene, signals)"), label)
         entries[name] = made
     return entries
 
@@ -266,24 +269,19 @@ def _given(what: str, name: str, make: Any) -> Any:
     return make
 
 
-def _check_maker(what: str, name: str, make: Any, kind: Any, methods: str) -> None:
-    """Raise ValueError unless calling ``make`` returns an object with the interface ``kind``."""
-    if make is None:
-        return
+def _check_maker(label: str, make: Any, kind: Any, methods: str) -> Any:
+    """Return what ``make`` makes; raise ValueError unless it is an object with the interface ``kind``."""
     if not callable(make):
         raise ValueError(
-            f"{what} {name!r} is {make!r}; it must be what makes one for each episode, such as a class, not one itself"
+            f"{label} is {make!r}; it must be what makes one for each episode, such as a class, not one itself"
         )
     try:
         made = make()
     except Exception as error:
-        raise ValueError(f"{what} {name!r}: {make!r}() gave an error, {type(error).__name__}: {error}") from error
+        raise ValueError(f"{label}: {make!r}() gave an error, {type(error).__name__}: {error}") from error
     if isinstance(made, type) or not isinstance(made, kind):
-        raise ValueError(f"{what} {name!r}: {make!r} makes {made!r}, which is no object with {methods}")
-    try:
-        inspect.signature(made.reset).bind(seed=0)
-    except TypeError:
-        raise ValueError(f"{what} {name!r}: its reset must take a seed, as in reset(self, seed=None)") from None
+        raise ValueError(f"{label}: {make!r} makes {made!r}, which is no object with {methods}")
+    return made
 
 
 def checked_automation(make: Any) -> None:
@@ -295,15 +293,8 @@ def checked_automation(make: Any) -> None:
     Raises:
         ValueError: if ``make`` does not make an automation.
     """
-    if make is None:
-        return
-    if isinstance(make, type) or callable(make):
-        made = make()
-        if not isinstance(made, type) and isinstance(made, Planner):
-            return
-    raise ValueError(
-        f"automation = {make!r} must make an automation for each episode, such as a class with reset() and act(scene)"
-    )
+    if make is not None:
+        _check_maker("automation", make, Planner, "reset() and act(scene)")
 
 
 def chosen_suite(suite: str | Suite) -> Suite:

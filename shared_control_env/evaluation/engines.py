@@ -66,7 +66,8 @@ def processes(batches: Sequence[EpisodeBatch], jobs: int) -> Iterator[tuple[Epis
             pickle.dumps((batch.driver, batch.authority, batch.automation))
         except Exception as error:
             raise WorkersLostError(
-                f"jobs = {jobs}: driver {batch.driver[0]!r} or authority {batch.authority[0]!r} cannot be sent to "
+                f"jobs = {jobs}: driver {batch.driver[0]!r} or authority {batch.authority[0]!r}"
+                f"{' or the automation' if batch.automation else ''} cannot be sent to "
                 f"another process ({error}); define it in a file, under a name, or use jobs=1"
             ) from None
     first: dict[bool, EpisodeBatch] = {}

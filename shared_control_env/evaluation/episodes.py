@@ -21,7 +21,7 @@ from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.parameters import TRAFFIC_BODY
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
 from shared_control_env.envs.scenarios import SCENARIOS
-from shared_control_env.envs.settings import Settings, change, merge, plain
+from shared_control_env.envs.settings import change, defaults, plain
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
 from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
 from shared_control_env.evaluation.metrics import Trajectory, measure_all
@@ -33,7 +33,7 @@ LARGEST_BATCH = 170
 MOST_SEEDS = 1_000_000
 """Largest number of seeds of a run."""
 
-NOT_IN_THE_NUMBERS = ("report.py", "replay.py", "statistics.py", "storage.py", "fingerprint.py", "graphics.py")
+NOT_IN_THE_NUMBERS = ("report.py", "replay.py", "statistics.py", "storage.py", "fingerprint.py", "viewer.py")
 """Source files that no result depends on."""
 
 AS_GIVEN = "own"
@@ -122,9 +122,9 @@ def settings_of(batch: EpisodeBatch, degradation: str | None) -> dict[str, Any]:
     given = batch.config.get("randomise")
     for draw in given if isinstance(given, list) else ():
         if isinstance(draw, Mapping) and isinstance(draw.get("setting"), str):
-            _refuse_clash({k: v for k, v in owners.items() if v[0] != "config"}, "config", draw["setting"], DRAWN)
+            _refuse_clash(owners, "config", draw["setting"], DRAWN)
     if entry.draws:
-        default = merge(plain(Settings()), SCENARIOS[batch.scenario].settings)
+        default = defaults(SCENARIOS[batch.scenario].settings)
         config["randomise"] = [*change(default, batch.config)["randomise"], *entry.draws]
     return config
 
@@ -165,7 +165,7 @@ def _joined(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, An
 def source_digest() -> str:
     """Digest of the source files that results depend on, which distinguishes results of a changed checkout."""
     digest = sha256()
-    for folder in ("core", "controllers", "envs", "vector", "learned", "evaluation"):
+    for folder in ("core", "controllers", "envs", "wrappers", "vector", "learned", "evaluation"):
         for path in sorted((Path(shared_control_env.__file__).parent / folder).rglob("*.py")):
             if path.name not in NOT_IN_THE_NUMBERS:
                 digest.update(path.read_bytes())
@@ -303,8 +303,7 @@ class Policies:
 
     def __init__(self, batch: EpisodeBatch, env: Any) -> None:
         self._scenes, self._signals = env.views()
-        limits = env.config["limits"]
-        self._limits = np.array([limits["a_max"], limits["delta_max"]])
+        self._limits = np.array([[each.limits.a_max, each.limits.delta_max] for each in env.episodes])
         make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
         self._names = f"driver {batch.driver[0]!r}", f"authority {batch.authority[0]!r}"
         self._drivers: list[Driver] = [make_driver() for _ in batch.episodes] if make_driver else []
@@ -345,7 +344,7 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
 
     Args:
         batch: the batch.
-        frames: list to which pictures of the first episode before each step are appended; None for no pictures.
+        frames: list to which pictures of all episodes before each step are appended; None for no pictures.
 
     Returns:
         One row per episode: identity, end, the driver's K_h [-] and T_h [s], the time at which a person at rest noticed
@@ -357,9 +356,10 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
     changes = {degradation: settings_of(batch, degradation) for degradation, _ in batch.episodes}
     configs = [changes[degradation] for degradation, _ in batch.episodes]
     observations, _ = env.reset(seed=seeds, options={"config": configs})
-    settings, drawn = env.episodes[0], env.episodes
-    recorder, policies = Recorder(settings.steps, len(batch.episodes)), Policies(batch, env)
-    for k in range(settings.steps):
+    drawn = env.episodes
+    steps = max(episode.steps for episode in drawn)  # they are equal in the kernel
+    recorder, policies = Recorder(steps, len(batch.episodes)), Policies(batch, env)
+    for k in range(steps):
         if frames is not None:
             frames.extend(env.render() or ())
         action = policies.decide(observations)
@@ -377,7 +377,7 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
             "authority": batch.authority[0],
             "seed": seed,
             "terminated": bool(recorder.crashed[i] or recorder.left_road[i]),
-            "duration": recorder.lengths[i] / settings.policy_frequency,
+            "duration": recorder.lengths[i] / drawn[i].policy_frequency,
             **plain(drawn[i])["driver_lag"],
             "noticed": recorder.noticed[i],
             **measure_all(recorder.trajectory(i, drawn[i], wall_time)),

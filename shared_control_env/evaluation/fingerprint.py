@@ -1,11 +1,11 @@
-"""Digests of user-defined drivers and allocators, so that results of different ones with one name are not mixed."""
+"""Digests of what users define, so that results of different definitions with one name are not mixed."""
 
 from __future__ import annotations
 
 import pickle
 import sys
 import sysconfig
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 
 import shared_control_env
 from shared_control_env.controllers.arrays import as_array
+from shared_control_env.evaluation.storage import digest
 
 _INSTALLED = [
     *(Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib", "purelib", "platlib")),
@@ -26,31 +27,20 @@ _INSTALLED = [
 _NOT_CODE = ("__dict__", "__weakref__", "__doc__", "__module__", "__firstlineno__", "__static_attributes__")
 
 
-def fingerprint(make: Callable[..., Any]) -> str:
-    """Digest of the maker of a driver or an allocator.
+def fingerprint(value: Any) -> str:
+    """Digest of what a user gives: a maker of drivers, allocators or automations, or an addition to a table.
 
-    The digest covers the code of the class, everything that the code uses from the user's own modules, and the
-    arguments. Comments and layout do not affect the digest. Data that is read from files at run time is not covered.
-
-    Args:
-        make: a class, a function, or a :class:`functools.partial` of one.
-
-    Raises:
-        ValueError: if the maker holds an object whose content cannot be read.
-    """
-    return digest_of(make)
-
-
-def digest_of(value: Any) -> str:
-    """Digest of a value: of the code of functions and classes, and of the content of all other objects.
+    The digest covers the code of functions and classes, everything that the code uses from the user's own modules, the
+    arguments, and the content of all other objects. Comments and layout do not affect it. Data that is read from files
+    at run time is not covered.
 
     Args:
-        value: the value.
+        value: a class, a function, a :class:`functools.partial` of one, or an entry of a table.
 
     Raises:
-        ValueError: as for :func:`fingerprint`.
+        ValueError: if it holds an object whose content cannot be read.
     """
-    return sha256("\n".join(_parts(value, {})).encode()).hexdigest()[:16]
+    return digest("\n".join(_parts(value, {})))
 
 
 def _is_own(module: str) -> bool:
@@ -166,5 +156,6 @@ def _pickled(value: Any) -> str:
         return _digest(pickle.dumps(value, protocol=5))
     except Exception as error:  # pickling code of a user's object may raise anything
         raise ValueError(
-            f"cannot read the content of {value!r} ({error}); give a fingerprint: DriverEntry(..., fingerprint='...')"
+            f"cannot read the content of {value!r} ({error}); give a fingerprint: "
+            "DriverEntry(..., fingerprint='...'), or define it without such an object"
         ) from None

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shared_control_env.nearest import hint
+from shared_control_env.nearest import check_new_name, hint
 
 LATERAL_ACCELERATION_LIMIT = 3.0
 """Largest lateral acceleration of a lane keeping system [m/s^2]; ISO 11270."""
@@ -96,6 +96,12 @@ class Metric(NamedTuple):
     measure: Callable[[Trajectory], float]
 
 
+IDENTITY = (
+    *("scenario", "degradation", "driver", "authority", "seed", "terminated", "duration", "K_h", "T_h", "noticed"),
+    *("config_hash", "version", "versions"),
+)
+"""Columns of the table that are no metrics."""
+
 BETTER = ("lower", "higher", "neither")
 """Directions in which a metric is better."""
 
@@ -117,8 +123,7 @@ def metric(unit: str, better: str) -> Callable[[Callable[[Trajectory], float]], 
         raise ValueError(f"better = {better!r}; {hint(better, BETTER)}")
 
     def enter(measure: Callable[[Trajectory], float]) -> Callable[[Trajectory], float]:
-        if measure.__name__ in METRICS:
-            raise ValueError(f"metric {measure.__name__!r} is there already")
+        check_new_name("metric", measure.__name__, (*METRICS, *IDENTITY))
         if not measure.__doc__:
             raise ValueError(f"metric {measure.__name__!r} has no docstring, which is its definition")
         METRICS[measure.__name__] = Metric(unit, better, " ".join(measure.__doc__.split()), measure)

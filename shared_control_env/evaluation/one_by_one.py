@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from shared_control_env.controllers.arrays import read_only
 from shared_control_env.controllers.automation import Planner
-from shared_control_env.envs.environments import environment_class
 from shared_control_env.envs.settings import Settings
-from shared_control_env.wrappers import AuthorityLimiter, DriverModel
+from shared_control_env.wrappers import DriverModel
+from shared_control_env.wrappers.limited import Limited
 
 
 class SingleEnvironments:
@@ -36,9 +37,7 @@ class SingleEnvironments:
     ) -> None:
         self._envs: list[Any] = []
         for automation in automations:
-            env: Any = environment_class(scenario)(dict(config), render_mode=render_mode)
-            env.automation = automation
-            env = AuthorityLimiter(env) if limiter else env
+            env = Limited(scenario)(dict(config), render_mode, limiter, automation)
             self._envs.append(DriverModel(env) if driver else env)
         self._ended = np.zeros(len(self._envs), dtype=bool)
         self._results: list[Any] = [None] * len(self._envs)
@@ -54,8 +53,9 @@ class SingleEnvironments:
         return tuple(env.unwrapped.episode for env in self._envs)
 
     def views(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Scenes and signals as lists of 0-d records, which always show the present step."""
-        return [env.unwrapped.scene for env in self._envs], [env.unwrapped.signals for env in self._envs]
+        """Scenes and signals as lists of read-only 0-d records, which always show the present step."""
+        bare = [env.unwrapped for env in self._envs]
+        return [read_only(env.scene) for env in bare], [read_only(env.signals) for env in bare]
 
     def reset(self, *, seed: Sequence[int], options: Mapping[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin an episode in each environment.

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from shared_control_env.evaluation.statistics import STATISTICS, Interval, intervals
-from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.evaluation.storage import MAY_GROW, write_atomically
 
 if TYPE_CHECKING:
     from shared_control_env.evaluation.metrics import Metric
@@ -190,10 +190,19 @@ def gallery(table: pd.DataFrame, folder: ResultsFolder | None = None) -> list[di
 
 
 def _command(episode: Mapping[str, str], folder: ResultsFolder | None) -> str:
-    """The replay command of an episode, or an instruction if the driver or authority cannot be imported."""
-    for part, what in (("drivers", "driver"), ("authorities", "authority")) if folder is not None else ():
-        if folder.manifest[part][episode[what]]["origin"] is None:  # type: ignore[union-attr]
-            return f"by evaluation.replay_episode, in the program that has the {what} {episode[what]!r}"
+    """The replay command of an episode, or an instruction if what it needs cannot be imported."""
+    manifest: Mapping[str, Any] = {} if folder is None else folder.manifest
+    needed = {}
+    for part, what in zip(MAY_GROW, ("driver", "authority"), strict=True):
+        if part in manifest:
+            needed[f"the {what} {episode[what]!r}"] = manifest[part][episode[what]]
+    if manifest.get("automation"):
+        needed["the automation"] = manifest["automation"]
+    if manifest.get("additions"):
+        needed["the additions"] = {"origin": None}
+    for what, entry in needed.items():
+        if entry["origin"] is None:
+            return f"by evaluation.replay_episode, in the program that has {what}"
     source = [] if folder is None else ["--from", str(folder.path)]
     parts = [part for name, value in episode.items() for part in (f"--{name}", value)]
     return shlex.join(["shared-control", "replay", *source, *parts])

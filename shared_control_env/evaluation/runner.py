@@ -13,7 +13,7 @@ import pandas as pd
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.seeds import checked_seed
-from shared_control_env.envs.settings import as_plain
+from shared_control_env.envs.settings import Settings, as_plain, combined
 from shared_control_env.evaluation import engines
 from shared_control_env.evaluation.additions import additions, described
 from shared_control_env.evaluation.catalogue import (
@@ -34,7 +34,7 @@ from shared_control_env.evaluation.episodes import MOST_SEEDS, EpisodeBatch, pla
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.replay import GIVEN
 from shared_control_env.evaluation.storage import MAY_GROW, REPORT, TABLE, ResultsFolder, sorted_table, write_atomically
-from shared_control_env.vector.checks import checked_settings
+from shared_control_env.vector.checks import settings_for_kernel
 
 ENGINES = ("local", "ray")
 """Names of the engines."""
@@ -149,18 +149,20 @@ def _checked_seeds(seeds: Iterable[int]) -> list[int]:
 
 def _check_settings(batches: Sequence[EpisodeBatch]) -> None:
     """Check the settings of all batches before the first episode runs."""
-    seen = set()
+    checked: dict[tuple[str, bool, str], Settings] = {}
     for batch in batches:
+        scenario, in_kernel = SCENARIOS[batch.scenario], batch.automation is None
         config = settings_of(batch, batch.episodes[0][0])
-        key = batch.scenario, json.dumps(config, sort_keys=True, default=repr)
-        if key not in seen:
-            seen.add(key)
-            for_kernel = batch.automation is None
-            settings = checked_settings(SCENARIOS[batch.scenario], config, for_kernel)
-            if settings.has_person and batch.driver[1].make is not None:
-                raise ValueError(
-                    f"config['person']['active'] = True would not act: {batch.driver[0]!r} is no driver of the kernel"
-                )
+        key = batch.scenario, in_kernel, json.dumps(config, sort_keys=True, default=repr)
+        if key not in checked:
+            if in_kernel:
+                checked[key] = settings_for_kernel(scenario, config)
+            else:
+                checked[key] = combined(scenario.settings, config)
+        if checked[key].has_person and batch.driver[1].make is not None:
+            raise ValueError(
+                f"config['person']['active'] = True would not act: {batch.driver[0]!r} is no driver of the kernel"
+            )
 
 
 def _described(
@@ -179,7 +181,7 @@ def _described(
             "draws": as_plain(entry.draws),
         }
     )
-    if known.get(name) is entry:
+    if known.get(name) == entry:
         return {"origin": "catalogue", "fingerprint": None, **own}
     if entry.make is None:
         return {"origin": "settings", "fingerprint": entry.fingerprint, **own}

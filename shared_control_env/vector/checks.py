@@ -15,7 +15,7 @@ from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.scenarios import Scenario
 from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.settings import OWN_TRAFFIC, Settings
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLACK, SLOT_SPACES, Clipping
+from shared_control_env.envs.slots import AUTHORITY, BOUNDS, DRIVER, SLACK, Clipping
 
 ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_vehicles_type", "reward_terms")
 """Settings that must be equal in all environments."""
@@ -43,7 +43,7 @@ class OpenSlots:
     Attributes:
         num_envs: number of environments N.
         slots: names of the open slots.
-        nothing: actions with zeros in both slots.
+        no_actions: actions with zeros in both slots.
         clipping: counts the values beyond their bounds.
     """
 
@@ -51,7 +51,6 @@ class OpenSlots:
         self.num_envs, self.slots = num_envs, slots
         self.no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
         self.clipping = Clipping(num_envs)
-        self._bounds = {slot: (SLOT_SPACES[slot].low[0], SLOT_SPACES[slot].high[0]) for slot in slots}
 
     def checked(self, actions: Any) -> Actions:
         """Check the actions of one step. Bound slots are filled with zeros.
@@ -71,7 +70,7 @@ class OpenSlots:
             raise ValueError(f"actions must be a dict with the keys {sorted(self.slots)}, each of shape ({n}, n)")
         values = {DRIVER: self.no_actions.commands, AUTHORITY: self.no_actions.alphas}
         for slot in self.slots:
-            size, (low, high) = SLOT_SPACES[slot].shape[0], self._bounds[slot]
+            low, high, size = BOUNDS[slot]
             array = _numbers(given[slot])
             if array is None or array.shape != (n, size):
                 what = f"shape {array.shape}" if array is not None else f"the value {given[slot]!r}"
@@ -172,21 +171,18 @@ def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
     return spellings[text]
 
 
-def checked_settings(scenario: Scenario, config: Mapping[str, Any], for_kernel: bool = True) -> Settings:
-    """Settings of a scenario with changes, after all checks.
+def settings_for_kernel(scenario: Scenario, config: Mapping[str, Any]) -> Settings:
+    """Settings of a scenario with changes, after all checks, including those for the kernel.
 
     Args:
         scenario: scenario that provides the defaults.
         config: changes to the settings.
-        for_kernel: whether the kernel runs them, which supports fewer settings than the single environment.
 
     Raises:
-        ValueError: for a wrong setting, or, for the kernel, a setting that only the single environment supports.
+        ValueError: for a wrong setting, or a setting that only the single environment supports.
     """
-    default = configuration.merge(configuration.plain(Settings()), scenario.settings)
-    settings = configuration.check(configuration.change(default, config))
-    if for_kernel:
-        _check_for_kernel(settings)
+    settings = configuration.combined(scenario.settings, config)
+    _check_for_kernel(settings)
     return settings
 
 

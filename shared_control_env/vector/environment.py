@@ -13,8 +13,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from shared_control_env.controllers.allocators import Allocator
+from shared_control_env.controllers.arrays import read_only
 from shared_control_env.core import kernel
-from shared_control_env.core.authority.allocators import ALLOCATE, fuzzy_authority
+from shared_control_env.core.authority.allocators import ALLOCATE, FUZZY, fuzzy_authority
 from shared_control_env.core.batch import (
     NOT_LOADED,
     WORK,
@@ -45,7 +46,7 @@ from shared_control_env.vector.checks import (
     checked_generators,
     checked_mask,
     checked_mode,
-    checked_settings,
+    settings_for_kernel,
 )
 from shared_control_env.vector.pictures import Pictures
 from shared_control_env.vector.threads import Threads
@@ -115,6 +116,7 @@ class SharedControlVectorEnv(VectorEnv):
                 "environment, or its commands as actions"
             )
         self._allocate = _compiled(limiter)
+        self._user_allocates = self._allocate not in (None, fuzzy_authority, *FUZZY.values())
         if is_interpreted():
             raise ValueError(
                 "NUMBA_DISABLE_JIT is set, and the vectorised environment is compiled alone: unset it, or use gym.make "
@@ -124,9 +126,8 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"render_mode = {render_mode!r} must be one of {self.metadata['render_modes']} or None")
         self._mode, self.render_mode = checked_mode(autoreset_mode), render_mode
         self._driver = bool(driver)
-        settings = checked_settings(scenario, {} if config is None else config)
-        if settings.has_person and not driver:
-            raise ValueError("config['person']['active'] = True would not act: it needs driver=True")
+        settings = settings_for_kernel(scenario, {} if config is None else config)
+        self._check_person([settings])
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._observation = OBSERVATIONS[settings.observation.type]
         self._define_spaces()
@@ -198,12 +199,12 @@ class SharedControlVectorEnv(VectorEnv):
     @property
     def scenes(self) -> np.ndarray:
         """The perceived scene of each environment, records of :data:`records.SCENE`, shape (N,); read only."""
-        return _read_only(self._batch.scenes)
+        return read_only(self._batch.scenes)
 
     @property
     def signals(self) -> np.ndarray:
         """Signals of the present step of each environment, records of :data:`records.SIGNALS`, (N,); read only."""
-        return _read_only(self._batch.signals)
+        return read_only(self._batch.signals)
 
     def views(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Scenes and signals as lists of read-only 0-d records, which always show the present step."""
@@ -270,6 +271,7 @@ class SharedControlVectorEnv(VectorEnv):
         changed = None if config is None else changed_settings(config, self._settings, self._templates)
         generators = checked_generators(seed, self.num_envs)
         if changed is not None:
+            self._check_person([changed[0], *changed[1]])
             self._adopt(*changed)
         for i in np.flatnonzero(mask).tolist():
             seeded = generators[i]
@@ -298,7 +300,8 @@ class SharedControlVectorEnv(VectorEnv):
             ValueError: for a malformed action, with the index of the environment if there is one; nothing has moved
                 then. Also before the first reset, and for an ended environment if the mode does not reset it. Also if
                 an episode cannot be drawn: this is raised before anything moves, except in the mode ``same_step``,
-                where the environments have moved and the ended ones need a reset.
+                where the environments have moved and the ended ones need a reset. Also if a user-defined allocator
+                gives an authority that is no number; the environments have moved then.
             ClosedEnvironmentError: after :meth:`close`.
         """
         self._check_ready()
@@ -334,8 +337,8 @@ class SharedControlVectorEnv(VectorEnv):
             raise ValueError(f"rollout() needs limiter=True and driver=True; open are {list(self._open.slots)}")
         steps = checked_count("steps", steps)
         out = self._outputs()
-        own = self._allocate is not fuzzy_authority
-        one_by_one = self._random or own or self.render_mode is not None or self._mode is AutoresetMode.SAME_STEP
+        same_step, drawn = self._mode is AutoresetMode.SAME_STEP, self.render_mode is not None
+        one_by_one = self._random or self._user_allocates or drawn or same_step
         piece = 1 if one_by_one else max(1, AT_ONCE // self.num_envs)
         taken = []
         for first in range(0, steps, piece):
@@ -358,6 +361,11 @@ class SharedControlVectorEnv(VectorEnv):
             return None
         frames = [self._pictures.draw(i, self._episodes[i], self._batch) for i in range(self._pictures.drawn)]
         return None if self.render_mode == "human" else tuple(frames)
+
+    def _check_person(self, present: Sequence[Settings]) -> None:
+        """Raise ValueError if any of the settings has a person but the driver's slot is open."""
+        if not self._driver and any(settings.has_person for settings in present):
+            raise ValueError("config['person']['active'] = True would not act: it needs driver=True")
 
     def _show(self) -> None:
         """Draw the window if there is one."""
@@ -399,6 +407,7 @@ class SharedControlVectorEnv(VectorEnv):
         """
         settings, templates = changed_settings(config, self._settings, self._templates)
         check_shared_settings(settings, self._settings)
+        self._check_person([settings, *templates])
         if not self._started:
             self._adopt(settings, templates)
             return
@@ -465,7 +474,7 @@ class SharedControlVectorEnv(VectorEnv):
         finally:
             self._observations = out.observations.copy()
             self._pictures.note(out.infos, active, self._batch)
-        if self._allocate not in (None, fuzzy_authority):
+        if self._user_allocates:
             wrong = np.flatnonzero(active & np.isnan(out.infos["alpha_a"]))
             if len(wrong):
                 raise ValueError(f"the allocator gave environment {wrong[0]} alpha_a = nan; it must be in [0, 1]")
@@ -523,13 +532,6 @@ def _compiled(limiter: Any) -> Any:
         )
     ALLOCATE.address(compiled)
     return compiled
-
-
-def _read_only(array: np.ndarray) -> np.ndarray:
-    """A read-only view of an array."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
 
 
 class Vectorised:

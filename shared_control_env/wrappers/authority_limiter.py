@@ -9,8 +9,9 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
 from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, checked_authority
+from shared_control_env.controllers.driver import check_reset
 from shared_control_env.envs.slots import AUTHORITY
-from shared_control_env.wrappers.slot_wrapper import SlotWrapper, check_reset
+from shared_control_env.wrappers.slot_wrapper import SlotWrapper
 
 
 class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
@@ -38,7 +39,7 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
                 f"allocator = {allocator!r} must be an object with reset(seed) and allocate(scene, signals) -> alpha_a"
             )
         if allocator is not None:
-            check_reset(allocator, "allocator")
+            check_reset(allocator, f"allocator = {allocator!r}")
         self._given = allocator
         self.allocator: Allocator = self._default() if allocator is None else allocator
 

@@ -9,10 +9,10 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from shared_control_env.controllers.driver import Driver, PersonDriver, checked_command, driver_of
+from shared_control_env.controllers.driver import Driver, PersonDriver, check_reset, checked_command, driver_of
 from shared_control_env.envs.settings import parameters_of
 from shared_control_env.envs.slots import DRIVER
-from shared_control_env.wrappers.slot_wrapper import SlotWrapper, check_reset
+from shared_control_env.wrappers.slot_wrapper import SlotWrapper
 
 
 class DriverModel(SlotWrapper, RecordConstructorArgs):
@@ -42,10 +42,9 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
                 f"driver = {driver!r} must be an object with reset(seed) and act(observation, scene) -> [a, delta]"
             )
         if driver is not None:
-            check_reset(driver, "driver")
-            if self.shared.settings.has_person:
-                raise ValueError("config['person']['active'] = True would not act: another driver is given")
+            check_reset(driver, f"driver = {driver!r}")
         self._given = driver
+        self._check_person()
         self.driver: Driver = driver_of(parameters_of(self.shared.episode)) if driver is None else driver
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -54,8 +53,12 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         Args:
             seed: seed of the environment's random generator, or None.
             options: options of Gymnasium's ``reset``.
+
+        Raises:
+            ValueError: as for the environment; or for a person in the settings if a driver was given.
         """
         observation, info = self.env.reset(seed=seed, options=options)
+        self._check_person()
         if self._given is None:
             self.driver = driver_of(parameters_of(self.shared.episode))
         (own,) = self.shared.np_random.spawn(1)  # spawning leaves the environment's own draws unchanged
@@ -70,6 +73,11 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         """
         observation, reward, terminated, truncated, info = self.env.step(self.action(action))
         return observation, reward, terminated, truncated, {**info, **self._report()}
+
+    def _check_person(self) -> None:
+        """Raise ValueError if the settings have a person but a driver was given."""
+        if self._given is not None and self.shared.settings.has_person:
+            raise ValueError("config['person']['active'] = True would not act: another driver is given")
 
     def decide(self) -> np.ndarray:
         """The driver's command divided by its limits, shape (2,)."""

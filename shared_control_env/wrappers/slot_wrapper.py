@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 import gymnasium as gym
@@ -61,22 +60,6 @@ class SlotWrapper(gym.ActionWrapper):
             return value
         (other,) = self.open_slots
         return {self.slot: value, other: action}
-
-
-def check_reset(player: Any, what: str) -> None:
-    """Check that the ``reset`` of a driver or an allocator takes a seed.
-
-    Args:
-        player: the driver or allocator.
-        what: name of the object for the error message.
-
-    Raises:
-        ValueError: if ``reset`` does not take a seed.
-    """
-    try:
-        inspect.signature(player.reset).bind(seed=0)
-    except TypeError:
-        raise ValueError(f"{what} = {player!r}: its reset must take a seed, as in reset(self, seed=None)") from None
 
 
 def open_slots(env: gym.Env) -> tuple[str, ...]:

@@ -245,6 +245,13 @@ def test_a_person_beside_another_driver_is_refused():
         DriverModel(gym.make(TWO_LANE, config=config), Gives(np.zeros(2)))
     with pytest.raises(ValueError, match="needs driver=True"):
         gym.make_vec(TWO_LANE, num_envs=2, config=config)
+    options = {"config": config}
+    with pytest.raises(ValueError, match="would not act: another driver is given"):
+        DriverModel(gym.make(TWO_LANE), Gives(np.zeros(2))).reset(options=options)
+    many = gym.make_vec(TWO_LANE, num_envs=2)
+    for change in (lambda: many.reset(options=options), lambda: many.set_config([{}, config])):
+        with pytest.raises(ValueError, match="needs driver=True"):
+            change()
 
 
 def test_numbers_of_numpy_do_not_keep_a_spec_from_json():
@@ -468,8 +475,8 @@ def test_a_command_becomes_an_action():
         "highway_env.vehicle.objects.Obstacle",
         "nothing.Here",
         "highway_env.vehicles.behavior.IDMVehicle",
-        "shared_control_env.envs.vehicles.EgoVehicle",
-        "shared_control_env.envs.vehicles.ArrayVehicle",
+        "shared_control_env.envs.highway.vehicles.EgoVehicle",
+        "shared_control_env.envs.highway.vehicles.ArrayVehicle",
     ],
 )
 def test_other_vehicles_are_vehicles(path):

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from shared_control_env.core import parameters as core
 from shared_control_env.core.faults.kinds import KINDS, LENGTH, RATE, SHARE, TIME, Kind
 from shared_control_env.core.records import MAX_DELAY
-from shared_control_env.envs.settings.changes import at
+from shared_control_env.envs.settings.changes import at, change, merge
 from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings, plain
 from shared_control_env.nearest import hint, nearest
 
@@ -59,6 +59,28 @@ def check(config: Mapping[str, Any]) -> Settings:
     _check_vehicle(settings)
     _check_idle(settings)
     return settings
+
+
+def defaults(scenario: Mapping[str, Any]) -> dict[str, Any]:
+    """All settings as a plain dict, with the values of a scenario.
+
+    Args:
+        scenario: settings of the scenario, a nested dict.
+    """
+    return merge(plain(Settings()), scenario)
+
+
+def combined(scenario: Mapping[str, Any], config: Mapping[str, Any]) -> Settings:
+    """Settings of a scenario with changes, after all checks.
+
+    Args:
+        scenario: settings of the scenario, a nested dict.
+        config: changes to them, a nested dict.
+
+    Raises:
+        ValueError: for a wrong setting, as :func:`check`.
+    """
+    return check(change(defaults(scenario), config))
 
 
 def _validated(config: Mapping[str, Any]) -> Settings:
@@ -274,9 +296,9 @@ def _check_places(settings: Settings) -> None:
             )
         placed.append((name, vehicle.lane, vehicle.position))
         changes.append((name, vehicle.lane_change))
-    for name, change in changes:
-        if change is not None and change.lane >= lanes:
-            raise ValueError(f"{name}['lane_change']['lane'] = {change.lane} must lie in [0, {lanes - 1}]")
+    for name, lane_change in changes:
+        if lane_change is not None and lane_change.lane >= lanes:
+            raise ValueError(f"{name}['lane_change']['lane'] = {lane_change.lane} must lie in [0, {lanes - 1}]")
     for i, (name, lane, position) in enumerate(placed):
         if lane >= lanes:
             raise ValueError(f"{name}['lane'] = {lane} must lie in [0, {lanes - 1}]")

@@ -1,7 +1,9 @@
-"""A tyre, an observation and a term of the reward that tests add to those of the package, once a process."""
+"""A tyre, an observation and a term of the reward that tests add to those of the package, and take away again."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import tanh
 
 from shared_control_env.core.feedback.observation import OBSERVATIONS, Observation, add_observation
@@ -25,9 +27,13 @@ def _lateral_speed(step):
     return -min(1.0, abs(step.scene.z[4]))
 
 
-if TYRE not in TYRES:
+@contextmanager
+def added() -> Iterator[None]:
+    """Have the additions while the context lasts: results of other tests of the process do not depend on them."""
     add_tyre(TYRE, _saturating)
-if OBSERVATION not in OBSERVATIONS:
     add_observation(Observation(OBSERVATION, (("lateral error [m]", 4.0), ("heading [rad]", 0.8)), _brief))
-if TERM not in TERMS:
     add_term(Term(TERM, 0.1, _lateral_speed))
+    try:
+        yield
+    finally:
+        del TYRES[TYRE], OBSERVATIONS[OBSERVATION], TERMS[TERM]

@@ -13,6 +13,13 @@ from shared_control_env.envs.settings.checks import NOT_DRAWN
 from shared_control_env.wrappers import DriverModel
 from tests import extras
 
+
+@pytest.fixture(scope="module", autouse=True)
+def _extras():
+    with extras.added():
+        yield
+
+
 # A scenario in which every section has something to do: a lane change in traffic that changes lanes and brakes, under
 # two faults, with the predictive driver at the wheel and the law that needs alpha_a.
 BUSY = {

@@ -5,12 +5,13 @@ BIN = $(VENV)/bin
 RLLIB = $(VENV)-rllib
 PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
-.PHONY: help install reproduce reference sensitivity policies test rllib lint types golden hooks pythons bench figures clean
+.PHONY: help install reproduce reference sensitivity studies policies test rllib lint types golden hooks pythons bench figures clean
 
 help:
 	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
 	@echo "make reference  run the reference benchmark and write its table and report to results/reference"
 	@echo "make sensitivity  vary what the paper leaves open, and write a table and a picture to results/sensitivity"
+	@echo "make studies    repeat two published studies with the simulated persons, and write docs/studies.md"
 	@echo "make test       lint, types and all tests"
 	@echo "make golden     golden rollouts of two environments, in seconds"
 	@echo "make hooks      have git run lint, types and golden rollouts before every commit"
@@ -45,6 +46,9 @@ reference: $(VENV)/.experiments
 
 sensitivity: $(VENV)/.experiments
 	$(BIN)/python -m experiments.sensitivity $(ARGS)
+
+studies: $(VENV)/.experiments
+	$(BIN)/python -m experiments.studies $(ARGS)
 
 policies: $(VENV)/.dev
 	$(BIN)/python -m experiments.policies $(ARGS)

@@ -40,13 +40,19 @@ METRICS = (
 """Columns of the benchmark's table that are compared; smaller is better. ``terminated`` combines the next two."""
 
 COMPARED = {
-    "driver": ("mpc", "scripted", "none"),
+    "driver": ("internal_model", "mpc", "scripted", "none"),
     "allocator": ("proportional", "none", "fixed", "linear", "takeover", "time_based"),
 }
 """Drivers and authorities of the catalogue that the trained ones are compared with, by task."""
 
-BASELINE = {"driver": "mpc", "allocator": "proportional"}
-"""The baseline of each task: the paper's driver, and the paper's fuzzy inference."""
+BASELINE = {"driver": "internal_model", "allocator": "proportional"}
+"""The baseline of each task: the predictive driver who knows its own lag, and the paper's fuzzy inference.
+
+The paper's own driver (``mpc``) is a weak opponent: it does not know its lag and often steers itself off the road.
+"""
+
+BESIDE = "population"
+"""Driver beside whom authorities are compared: the persons that the allocators were trained with."""
 
 LEARNED = "learned"
 """Name of all trained policies together; each training seed is one sample."""
@@ -81,7 +87,7 @@ def measure(
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> pd.DataFrame:
-    """Run episodes of all drivers under the fuzzy limiter, or of all authorities with the predictive driver.
+    """Run episodes of all drivers under the fuzzy limiter, or of all authorities beside a population of persons.
 
     Args:
         task: key of :data:`agents.tasks.TASKS`.
@@ -97,7 +103,7 @@ def measure(
     make: Callable[[str], Any] = driver_entry if task == "driver" else authority_entry
     learned = {f"{LEARNED} {i}": make(source) for i, source in enumerate(sources)}
     entries = {**learned, **{name: make(name) for name in COMPARED[task]}}
-    drivers, authorities = (entries, "proportional") if task == "driver" else ("mpc", entries)
+    drivers, authorities = (entries, "proportional") if task == "driver" else (BESIDE, entries)
     suite = Suite("held-out seeds", tuple(scenarios), tuple(DEGRADATIONS))
     numbers = range(HELD_OUT_SEED, HELD_OUT_SEED + seeds)
     table = evaluate(drivers, authorities, suite, seeds=numbers, jobs=jobs, progress=progress)

@@ -261,7 +261,7 @@ def connect(address: str) -> None:
 
 
 def main(
-    env: Annotated[str, typer.Option(help="Id of the environment.")] = "SharedControl/LaneKeeping-v0",
+    env: Annotated[str, typer.Option(help="Id of the environment.")] = "SharedControl/LaneKeeping-v1",
     task: Annotated[str, typer.Option(help=f"One of: {', '.join(TASKS)}.")] = "driver",
     steps: Annotated[int, typer.Option(min=1, help="Steps in all; whole updates are made.")] = 1_000_000,
     runners: Annotated[int, typer.Option(min=1, help="Env runners, a core each.")] = 1,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from shared_control_env.envs.scenarios import DRAWN_V0, SCENARIOS
+from shared_control_env.envs.scenarios import DRAWN_V1, SCENARIOS
+from shared_control_env.evaluation.catalogue import DRIVERS
 from shared_control_env.registration import ENVIRONMENTS
 
 # An effort of 9 % of the limits counts as much as a lateral error of 0.1 m, or a speed error of 0.2 m/s. Progress
@@ -20,9 +22,9 @@ _REWARD = {
     "failure": 800.0,
 }
 
-# The predictive driver leaves the lane more often than it collides, and an allocator only chooses how much the driver
-# has to do. The weight of the lane is therefore larger, and that of the effort smaller. The weight of a failure is
-# smaller too, since the allocator seldom causes it.
+# People leave the lane more often than they collide, and an allocator only chooses how much the person has to do. The
+# weight of the lane is therefore larger, and that of the effort smaller. The weight of a failure is smaller too, since
+# the allocator seldom causes it.
 _ALLOCATOR_REWARD = {**_REWARD, "lane": 8.0, "effort": 0.4, "failure": 600.0}
 
 
@@ -38,21 +40,26 @@ class Task(NamedTuple):
     Attributes:
         description: description in one line.
         reward: weights of the terms of :mod:`core.feedback.reward`.
-        lag: random draws of the driver's response.
+        draws: random draws of the driver's response, entries of ``config["randomise"]``.
+        config: further settings, such as the persons at the wheel.
     """
 
     description: str
     reward: dict[str, float]
-    lag: tuple[dict[str, Any], ...]
+    draws: tuple[Mapping[str, Any], ...]
+    config: Mapping[str, Any] = {}
 
 
 # The lags are drawn around the five responses that the paper identified. A learning driver is drawn well beyond them:
-# a driver who is unsure of its own response keeps a margin. The predictive driver assumes the paper's lag. With lags
-# that differ so much from it, an allocator would mostly see that driver fail.
+# a driver who is unsure of its own response keeps a margin. An allocator learns beside the catalogue's population of
+# persons, most of whom rest their hands: beside the paper's predictive driver it would learn about that driver's
+# instability.
+_POPULATION = DRIVERS["population"]
+
 TASKS = {
     "driver": Task("compensate under the fuzzy limiter", _REWARD, _lag((0.75, 1.4), (0.1, 0.32))),
     "allocator": Task(
-        "decide alpha_a beside the predictive driver", _ALLOCATOR_REWARD, _lag((0.9, 1.25), (0.12, 0.24))
+        "decide alpha_a beside a population of persons", _ALLOCATOR_REWARD, _POPULATION.draws, _POPULATION.config
     ),
 }
 """Tasks by name."""
@@ -60,8 +67,8 @@ TASKS = {
 HELD_OUT_DEGRADATIONS = ("intermittent", "delay", "coloured_noise", "sign_error")
 """Degradations left out of training."""
 
-TRAINED_DEGRADATIONS = tuple(name for name in ("none", *DRAWN_V0) if name not in HELD_OUT_DEGRADATIONS)
-"""Degradations of training: none, and those of version 0 of the environments except the held-out ones."""
+TRAINED_DEGRADATIONS = tuple(name for name in ("none", *DRAWN_V1) if name not in HELD_OUT_DEGRADATIONS)
+"""Degradations of training: none, and those of version 1 of the environments except the held-out ones."""
 
 VALIDATION_SEED = 900_000
 """Training uses seeds below this one; seeds from here on are used to choose the best policy."""
@@ -71,16 +78,17 @@ HELD_OUT_SEED = 3_000_000
 
 
 def training_config(id: str, task: str) -> dict[str, Any]:
-    """Settings of training: all degradations except the held-out ones, random driver lag, and the task's reward.
+    """Settings of training: all degradations except the held-out ones, the task's driver, and the task's reward.
 
     Args:
         id: id of a registered environment, whose own random draws are kept.
         task: key of :data:`TASKS`.
     """
     return {
+        **TASKS[task].config,
         "authority": {"law": "proportional"},
         "faults": [],
         "degradations": list(TRAINED_DEGRADATIONS),
-        "randomise": [*SCENARIOS[ENVIRONMENTS[id]].settings.get("randomise", []), *TASKS[task].lag],
+        "randomise": [*SCENARIOS[ENVIRONMENTS[id]].settings.get("randomise", []), *map(dict, TASKS[task].draws)],
         "reward": dict(TASKS[task].reward),
     }

@@ -1,4 +1,4 @@
-"""Train a driver or an allocator: ``python -m agents.train --algo ppo --env SharedControl/LaneKeeping-v0``.
+"""Train a driver or an allocator: ``python -m agents.train --algo ppo --env SharedControl/LaneKeeping-v1``.
 
 Training proceeds in segments. Each segment begins from the checkpoint of the segment before. All random numbers are
 then seeded again from the seed and the number of steps so far. A training that was killed and started again therefore
@@ -224,7 +224,7 @@ class Training:
 def main(
     env: Annotated[
         str, typer.Option(help="Ids of environments, separated by commas; one named twice has twice the share.")
-    ] = "SharedControl/LaneKeeping-v0",
+    ] = "SharedControl/LaneKeeping-v1",
     algo: Annotated[str, typer.Option(help=f"One of: {', '.join(ALGORITHMS)}.")] = "ppo",
     task: Annotated[str, typer.Option(help=f"One of: {', '.join(TASKS)}.")] = "driver",
     steps: Annotated[int, typer.Option(min=1, help="Steps in all; whole segments are learned.")] = 3_000_000,

@@ -27,9 +27,9 @@ def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timi
     peer = environments.highway(repeats)
     report("highway-env, 4 vehicles, a step", str(peer), "1 x", "")
     limited = environments.limited(repeats)
-    report("TwoLane-v0, limiter, random driver, a step", str(limited), _times(peer, limited), "10 x highway-env")
+    report("TwoLane-v1, limiter, random driver, a step", str(limited), _times(peer, limited), "10 x highway-env")
     closed = environments.closed_loop(repeats)
-    report("TwoLane-v0, limiter and OSQP driver, a step", str(closed), _times(peer, closed), "5 x highway-env")
+    report("TwoLane-v1, limiter and OSQP driver, a step", str(closed), _times(peer, closed), "5 x highway-env")
 
     found = controllers.scenes(400)
     ours, slsqp, gaps = controllers.automation(found, repeats)
@@ -78,7 +78,7 @@ def _vectors(report: Callable[..., None], peer: Timing, single: Timing, repeats:
                 report(
                     f"kernel, N = {n}, {who}, all cores", str(every), rate, "1.9 x on two cores" if n == 1024 else ""
                 )
-    for id in ("SharedControl/LeadBraking-v0", "SharedControl/DenseTraffic-v0"):
+    for id in ("SharedControl/LeadBraking-v1", "SharedControl/DenseTraffic-v1"):
         one = vectors.kernel(256, False, max(3, repeats // 5), id).one
         what = f"kernel, N = 256, {id.removeprefix('SharedControl/')}, 1 core, draws of episodes included"
         report(what, str(one), f"{1.0 / one.median:,.0f}/s", "")

@@ -64,7 +64,7 @@ def scenes(count: int) -> list[np.ndarray]:
     while len(found) < count:
         start = {"speed": float(rng.uniform(6.0, 25.0)), "lateral_offset": float(rng.uniform(-1.5, 1.5))}
         config = {"ego": start, "authority": {"law": "proportional"}}
-        env = DriverModel(gym.make("SharedControl/TwoLane-v0", config=config))
+        env = DriverModel(gym.make("SharedControl/TwoLane-v1", config=config))
         env.reset(seed=0)
         for _ in range(20):
             found.append(env.unwrapped.scene.copy())  # type: ignore[attr-defined]
@@ -75,7 +75,7 @@ def scenes(count: int) -> list[np.ndarray]:
 
 def parameters_and_limits() -> tuple[np.ndarray, np.ndarray]:
     """Packed parameters of the environment, and the limits of the commands."""
-    env = gym.make("SharedControl/TwoLane-v0").unwrapped
+    env = gym.make("SharedControl/TwoLane-v1").unwrapped
     return env.parameters, env.command_limits  # type: ignore[attr-defined]
 
 
@@ -141,7 +141,7 @@ def osqp_driver(episodes: int) -> Timing:
         episodes: number of episodes of each case.
     """
     seconds = []
-    for name in ("SharedControl/TwoLane-v0", "SharedControl/Curve-v0"):
+    for name in ("SharedControl/TwoLane-v1", "SharedControl/Curve-v1"):
         env = DriverModel(gym.make(name, config={"authority": {"law": "proportional"}}))
         for _ in range(episodes):
             env.reset(seed=0)

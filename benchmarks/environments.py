@@ -63,22 +63,22 @@ def highway(repeats: int) -> Timing:
 
 
 def limited(repeats: int) -> Timing:
-    """Time of a step of TwoLane-v0 with limiter, triangulation at every step, and random driver actions.
+    """Time of a step of TwoLane-v1 with limiter, triangulation at every step, and random driver actions.
 
     Args:
         repeats: number of measured blocks.
     """
     gym.register_envs(shared_control_env)
-    env = gym.make("SharedControl/TwoLane-v0")
+    env = gym.make("SharedControl/TwoLane-v1")
     env.action_space.seed(0)
     return time_block(stepper(env, env.action_space.sample, STEPS), repeats)
 
 
 def closed_loop(repeats: int) -> Timing:
-    """Time of a step of TwoLane-v0 with the limiter and the OSQP driver bound.
+    """Time of a step of TwoLane-v1 with the limiter and the OSQP driver bound.
 
     Args:
         repeats: number of measured blocks.
     """
-    env = DriverModel(gym.make("SharedControl/TwoLane-v0"))
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1"))
     return time_block(stepper(env, lambda: np.int64(0), STEPS), repeats)

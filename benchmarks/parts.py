@@ -57,7 +57,7 @@ def _triangulation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.n
 def _risk(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         scene, p = batch.scenes[i], batch.parameters[i]
-        assess(setup.calls.assess, scene, batch.traffic[i], batch.lines[i], p, batch.signals[i])
+        assess(setup.calls.assess, scene, batch.traffic[i], batch.lines[i], p, batch.signals[i], works[0].motion)
 
 
 @njit
@@ -98,8 +98,7 @@ def _driver(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray)
             g.low,
             g.high,
         )
-        n = 2 * p.driver.H_c + 1
-        m = driver.count_rows(p)
+        n, m = driver.count_variables(p), driver.count_rows(p)
         solve_qp(n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set)
 
 
@@ -134,7 +133,7 @@ def times(repeats: int) -> dict[str, Timing]:
     """
     found = {}
     for name, loop in PARTS.items():
-        env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=N, threads=1)
+        env = gym.make_vec("SharedControl/TwoLane-v1", num_envs=N, threads=1)
         env.reset(seed=0)
         rng = np.random.default_rng(0)
         for _ in range(25):

@@ -15,7 +15,7 @@ begin = perf_counter()
 import gymnasium as gym
 import shared_control_env
 imported = perf_counter()
-env = gym.make("SharedControl/TwoLane-v0")
+env = gym.make("SharedControl/TwoLane-v1")
 env.reset(seed=0)
 env.step(env.action_space.sample())
 print(perf_counter() - imported, perf_counter() - begin)
@@ -28,7 +28,7 @@ from time import perf_counter
 begin = perf_counter()
 import gymnasium as gym, numpy as np
 import shared_control_env
-env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=64, threads=1, driver=sys.argv[1] == "driver")
+env = gym.make_vec("SharedControl/TwoLane-v1", num_envs=64, threads=1, driver=sys.argv[1] == "driver")
 env.reset(seed=0)
 env.step(np.zeros((64, 2)))
 print(perf_counter() - begin)

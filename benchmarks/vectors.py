@@ -39,7 +39,7 @@ class Scaling(NamedTuple):
     ratio: float
 
 
-def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/TwoLane-v0") -> Scaling:
+def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/TwoLane-v1") -> Scaling:
     """Time the kernel with random driver commands, or with the driver's program in the kernel.
 
     A round times every core alone, and all cores together after each of them. On a shared machine the cores differ, and
@@ -155,4 +155,4 @@ def metadrive(repeats: int) -> Timing | None:
 
 def bytes_per_environment() -> int:
     """Memory of one environment's state [B]."""
-    return gym.make_vec("SharedControl/TwoLane-v0", num_envs=64).unwrapped.bytes_per_environment  # type: ignore[attr-defined]
+    return gym.make_vec("SharedControl/TwoLane-v1", num_envs=64).unwrapped.bytes_per_environment  # type: ignore[attr-defined]

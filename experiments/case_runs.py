@@ -16,7 +16,7 @@ from shared_control_env.wrappers import DriverModel
 SEED = 0
 """Seed of every run; it has no effect, since the cases draw no random numbers."""
 
-SCENARIOS = {1: "SharedControl/TwoLane-v0", 2: "SharedControl/Curve-v0"}
+SCENARIOS = {1: "SharedControl/TwoLane-v1", 2: "SharedControl/Curve-v1"}
 PRESETS = ("graded", "paper")
 
 SIGNAL_COLUMNS = {

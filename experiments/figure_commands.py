@@ -27,15 +27,18 @@ def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
             (axes[0, 1], "delta", "(b) front steering angle", "deg", 180.0 / np.pi),
         ):
             name = symbol if symbol == "a" else r"\delta"
-            for column, label, colour, look, width in (
+            curves = (
                 (f"{symbol}_a_des", f"${name}_{{a,des}}$", style.DESIRED, "-", 2.6),
                 (f"{symbol}_a_f", f"${name}_{{a,f}}$", style.DEGRADED, "--", 1.6),
                 (f"{symbol}_a_act", f"${name}_{{a,act}}$", style.ACTUAL, "-", 1.2),
                 (f"{symbol}_h_des", f"${name}_{{h,des}}$", style.DRIVER, "--", 1.2),
                 (f"{symbol}_h_act", f"${name}_{{h,act}}$", style.DRIVER, "-", 1.2),
                 (symbol, "$u$", style.TOTAL, ":", 1.4),
-            ):
-                axis.plot(table["t"], scale * table[column], look, color=colour, lw=width, label=label)
+            )
+            values = {label: scale * table[column].to_numpy() for column, label, *_ in curves}
+            shown = style.labels(values, 0.005 * max(np.ptp(np.concatenate([*values.values()])), 1e-6))
+            for _, label, colour, look, width in curves:
+                axis.plot(table["t"], values[label], look, color=colour, lw=width, label=shown[label])
             axis.set(title=title, xlabel="t [s]", ylabel=unit)
             axis.legend(ncols=2, fontsize=8)
             style.mark_fault(axis, ONSET[case])

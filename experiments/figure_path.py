@@ -17,6 +17,10 @@ EVERY = 25
 """Number of time steps between two drawn safe areas and predictions."""
 
 
+SAME = 0.05
+"""Largest distance of two paths that are said to coincide [m]: half of a line's width."""
+
+
 def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
     """Draw one panel for the paper's law, and one for all laws.
 
@@ -40,9 +44,16 @@ def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
         _draw_road(second, line, table["s"].max() + 30.0)
         shown = [run for run in runs if run.case == case and run.preset == "graded"]
         # Wide lines are drawn first, and the paper's law last and dashed, so that coinciding paths stay visible.
-        for i, run in enumerate(sorted(shown, key=lambda run: run == main)):
+        shown.sort(key=lambda run: run == main)
+        names = [run.law if run.driver else "automation_alone" for run in shown]
+        stations = np.arange(0.0, max(runs[run]["s"].max() for run in shown), 0.5)
+        offsets = {
+            who: np.interp(stations, runs[run]["s"], runs[run]["y"], right=np.nan)
+            for who, run in zip(names, shown, strict=True)
+        }
+        labels = style.labels(offsets, SAME)
+        for i, (who, run) in enumerate(zip(names, shown, strict=True)):
             signals = runs[run]
-            who = run.law if run.driver else "automation_alone"
             ended = bool(signals["terminated"].iloc[-1])
             second.plot(
                 signals["x"],
@@ -53,7 +64,7 @@ def draw(runs: dict[Run, pd.DataFrame], case: int, path: Path) -> None:
                 marker="X" if ended else None,
                 markevery=[len(signals) - 1],
                 ms=9,
-                label=who.replace("_", " ") + (f" (ends at {signals['t'].iloc[-1]:.1f} s)" if ended else ""),
+                label=labels[who].replace("_", " ") + (f" (ends at {signals['t'].iloc[-1]:.1f} s)" if ended else ""),
             )
         second.set_title(f"Case {case}: path under every law")
         for axis in (first, second):

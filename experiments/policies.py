@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from collections.abc import Mapping
 from concurrent.futures import wait
 from multiprocessing import active_children
 from pathlib import Path
@@ -41,7 +42,7 @@ SCENARIOS = SUITES["full"].scenarios
 """Scenarios with random draws, in which the policies are compared."""
 
 IDS = [id for id, scenario in ENVIRONMENTS.items() if scenario in SCENARIOS]
-IDS += ["SharedControl/LeadBraking-v0", "SharedControl/LaneChange-v0"]
+IDS += ["SharedControl/LeadBraking-v1", "SharedControl/LaneChange-v1"]
 """Environments of training. Two have a double share: there, a driver who brakes or accelerates too slowly collides."""
 
 STEPS = {"driver": 4_900_000, "allocator": 2_900_000}
@@ -162,6 +163,18 @@ def verdict(rows: list[Row], task: str) -> list[str]:
     return lines
 
 
+def in_words(draw: Mapping[str, Any]) -> str:
+    """A random draw of the settings in words.
+
+    Args:
+        draw: entry of ``config["randomise"]``.
+    """
+    name = draw["setting"].split(".")[-1]
+    if "low" in draw:
+        return f"{name} {draw['low']} to {draw['high']}"
+    return f"{name} log-normal with median {draw['median']:.3g} and spread {draw['spread']:.2g}"
+
+
 def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
     """Values of the model card for one task.
 
@@ -176,9 +189,7 @@ def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
         "task": task,
         "description": TASKS[task].description,
         "reward": ", ".join(f"{name} {value:g}" for name, value in TASKS[task].reward.items()),
-        "lag": ", ".join(
-            f"{draw['setting'].split('.')[-1]} {draw['low']} to {draw['high']}" for draw in TASKS[task].lag
-        ),
+        "draws": ", ".join(in_words(draw) for draw in TASKS[task].draws),
         "asked": STEPS[task],
         "steps": f"{states[0]['steps']:,}",
         "fastest": round(min(seconds)),
@@ -204,6 +215,7 @@ def card(tables: dict[str, pd.DataFrame], jobs: int) -> str:
     versions = state_of("driver", 0)["card"]["versions"]
     return template.render(
         ids=IDS,
+        scenarios=len(SCENARIOS),
         seeds=list(SEEDS),
         versions=versions,
         jobs=jobs,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import matplotlib as mpl
 mpl.use("Agg")
 
 import matplotlib.pyplot as plt
+import numpy as np
 
 DESIRED, DEGRADED, ACTUAL, DRIVER, TOTAL = "#d62728", "#17becf", "#1f77b4", "#2ca02c", "#000000"
 LAW_COLOURS = {
@@ -44,6 +45,27 @@ def figure(path: Path, rows: int, columns: int, size: tuple[float, float]) -> It
             fig.savefig(path, dpi=150, metadata={"Software": None})
         finally:
             plt.close(fig)
+
+
+def labels(curves: Mapping[str, np.ndarray], within: float) -> dict[str, str]:
+    """Labels of curves that say which curves lie on one another: ``b (on a)``.
+
+    Args:
+        curves: values of every curve by its label, shape (n,); nan where a curve has ended.
+        within: largest distance of two curves that cannot be told apart in the picture, in the unit of the values.
+
+    Returns:
+        The label for the legend by the label of the curve.
+    """
+    shown: dict[str, str] = {}
+    for name, values in curves.items():
+        on = next((each for each in shown if _coincide(curves[each], values, within)), None)
+        shown[name] = name if on is None else f"{name} (on {on})"
+    return shown
+
+
+def _coincide(first: np.ndarray, second: np.ndarray, within: float) -> bool:
+    return bool((np.nan_to_num(np.abs(first - second)) <= within).all())
 
 
 def mark_fault(axis: plt.Axes, onset: float) -> None:

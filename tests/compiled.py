@@ -6,15 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from shared_control_env.core.compile.jit import jit, jit_inlined
+from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.control.qp.active_set import solve_qp
 from shared_control_env.core.faults.command import degrade
-from shared_control_env.core.risk import assessment
+from shared_control_env.core.records import record_dtype
+from shared_control_env.core.risk.assessment import ASSESS, assess
 from shared_control_env.core.risk.corridor import new_scratch, search_triangles
 from shared_control_env.core.risk.triangulation import triangulate
+from shared_control_env.core.world.motion import Motion
 from shared_control_env.core.world.scene import holes_in_region, perceive
 
-assess_risk = jit_inlined(assessment.assess)
+_assess = ASSESS.call
 
 
 @jit
@@ -36,11 +38,34 @@ def search(triangles: np.ndarray, parameters: np.ndarray, scene: np.ndarray) -> 
 
 
 @jit
-def monitor(scene: Any, traffic: Any, line: Any, faults: Any, memories: Any, parameters: Any, signals: Any) -> None:
-    """u_a,f and the risks of a scene, given u_a,des in the signals."""
+def monitor_with(
+    address: int,
+    scene: Any,
+    traffic: Any,
+    line: Any,
+    faults: Any,
+    memories: Any,
+    parameters: Any,
+    signals: Any,
+    work: Any,
+) -> None:
     s, p, g = scene[()], parameters[()], signals[()]
     degrade(g.u_a_des, s.k, p.task.dt, faults, memories, p.limits, g.u_a_f)
-    assess_risk(s, traffic, line, p, g)
+    _assess(address, s, traffic, line, p, g, work[()])
+
+
+def monitor(
+    scene: np.ndarray,
+    traffic: np.ndarray,
+    line: np.ndarray,
+    faults: np.ndarray,
+    memories: np.ndarray,
+    parameters: np.ndarray,
+    signals: np.ndarray,
+) -> None:
+    """u_a,f and the risks of a scene, given u_a,des in the signals."""
+    work = np.zeros((), record_dtype(Motion))
+    monitor_with(ASSESS.address(assess), scene, traffic, line, faults, memories, parameters, signals, work)
 
 
 @jit

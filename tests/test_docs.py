@@ -11,26 +11,26 @@ EXTENDING = ROOT / "docs/extending.md"
 # What must be true after the blocks under a heading have run.
 CHECKS = {
     "A kind of degradation": """
-        for made in (env, gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, config={"faults": [fault]})):
+        for made in (env, gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, config={"faults": [fault]})):
             made.reset(seed=0)
             lost = [made.step(np.zeros(made.action_space.shape))[4] for _ in range(30)][-1]
             assert np.all(np.ravel(lost["fault_active"])) and np.all(np.ravel(np.atleast_2d(lost["u_a_f"])[:, 1]) == 0.0)
         drawn.reset(seed=0)
         assert drawn.unwrapped.episode.faults[0].kind == "dead_band"
-        assert "sticky_wheel" not in gym.make("SharedControl/Bend-v0").unwrapped.config["degradations"]
+        assert "sticky_wheel" not in gym.make("SharedControl/Bend-v1").unwrapped.config["degradations"]
         refused(lambda: add_kind(Kind("dead_band", SHARE, act=dead_band)), "is there already")
         refused(lambda: add_kind(Kind("odd", "metres", act=dead_band)), "unit")
-        refused(lambda: gym.make("SharedControl/TwoLane-v0", config={"faults": [{**fault, "kind": "dead_bend"}]}), "dead_band")
-        refused(lambda: gym.make("SharedControl/TwoLane-v0", config={"faults": [{**fault, "size": 1.5}]}), "[0, 1]")
+        refused(lambda: gym.make("SharedControl/TwoLane-v1", config={"faults": [{**fault, "kind": "dead_bend"}]}), "dead_band")
+        refused(lambda: gym.make("SharedControl/TwoLane-v1", config={"faults": [{**fault, "size": 1.5}]}), "[0, 1]")
     """,
     "A tyre": """
-        dry = gym.make("SharedControl/Curve-v0")
+        dry = gym.make("SharedControl/Curve-v1")
         speeds = []
         for made in (dry, wet, light):
             made.reset(seed=0)
             speeds.append([made.step(np.array([0.0, 0.6]))[4]["state"][4] for _ in range(12)][-1])
         assert len(set(speeds)) == 3
-        slide = gym.make_vec("SharedControl/Curve-v0", num_envs=2, config={"vehicle": {"tyre": "saturating", "mu": 0.4}})
+        slide = gym.make_vec("SharedControl/Curve-v1", num_envs=2, config={"vehicle": {"tyre": "saturating", "mu": 0.4}})
         slide.reset(seed=0)
         assert [slide.step(np.full((2, 2), [0.0, 0.6]))[4]["state"][0, 4] for _ in range(12)][-1] == speeds[1]
         import copy, pickle
@@ -42,8 +42,8 @@ CHECKS = {
         assert wheel.observation_space.shape == (3,)
         first = wheel.reset(seed=0)[0]
         assert first.shape == (3,) and first in wheel.observation_space
-        assert gym.make("SharedControl/TwoLane-v0").observation_space.shape == (25,)
-        refused(lambda: gym.make("SharedControl/TwoLane-v0", config={"observation": {"type": "wheel"}}), "wheel-v0")
+        assert gym.make("SharedControl/TwoLane-v1").observation_space.shape == (25,)
+        refused(lambda: gym.make("SharedControl/TwoLane-v1", config={"observation": {"type": "wheel"}}), "wheel-v0")
         refused(lambda: wheel.reset(options={"config": {"observation": {"type": "driver-v0"}}}), "make a new one")
     """,
     "A term of the reward": """
@@ -51,12 +51,12 @@ CHECKS = {
         for _ in range(15):
             _, reward, _, _, info = calm.step(np.array([0.0, 0.5]))
         assert info["rewards"]["smooth"] == -min(1.0, calm.unwrapped.scene["z"][4] ** 2) < 0.0
-        plain = gym.make("SharedControl/TwoLane-v0")
+        plain = gym.make("SharedControl/TwoLane-v1")
         plain.reset(seed=0)
         for _ in range(15):
             _, other, _, _, bare = plain.step(np.array([0.0, 0.5]))
         assert "smooth" not in bare["rewards"] and abs(reward - other - 0.2 * info["rewards"]["smooth"]) < 1e-12
-        many_calm = gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, config={"reward_terms": [{"term": "smooth", "weight": 0.2}]})
+        many_calm = gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, config={"reward_terms": [{"term": "smooth", "weight": 0.2}]})
         many_calm.reset(seed=0)
         for _ in range(15):
             _, rewards, _, _, infos = many_calm.step(np.full((2, 2), [0.0, 0.5]))
@@ -69,7 +69,7 @@ CHECKS = {
             one, all_of_them = careful.step(np.zeros(2))[4], many.step(np.zeros((8, 2)))[4]
             assert one["alpha_a"] == all_of_them["alpha_a"][0]
         assert one["alpha_a"] == 0.5 * (1.0 - one["r_y"])
-        refused(lambda: gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, limiter=FixedAuthority()), "compiled")
+        refused(lambda: gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, limiter=FixedAuthority()), "compiled")
         assert set(evaluate("scripted", {"careful": Careful}, "paper")["authority"]) == {"careful"}
     """,
     "An automation": """
@@ -79,7 +79,7 @@ CHECKS = {
         assert len(table) == 2 and set(table["authority"]) == {"proportional"}
         other = evaluate("scripted", "proportional", "paper")
         assert not np.allclose(table["lateral_rms"], other["lateral_rms"])
-        refused(lambda: gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, automation=Cruise()), "automation")
+        refused(lambda: gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, automation=Cruise()), "automation")
     """,
     "A driver": """
         gentle.reset(seed=0)

@@ -49,7 +49,7 @@ def test_wheel_runs_from_a_read_only_folder(wheel, tmp_path):
 def test_base_install_needs_no_training_or_plotting_package():
     code = (
         "import sys, gymnasium as gym, shared_control_env\n"
-        "env = gym.make('SharedControl/TwoLane-v0'); env.reset(seed=0)\n"
+        "env = gym.make('SharedControl/TwoLane-v1'); env.reset(seed=0)\n"
         "print([m for m in ('torch', 'stable_baselines3', 'matplotlib.pyplot', 'casadi', 'typer') if m in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

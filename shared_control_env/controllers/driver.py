@@ -15,6 +15,7 @@ from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import entries
 from shared_control_env.core.control.condensing import WORKSPACE
+from shared_control_env.core.control.driver import count_rows, count_variables
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import PERSON_MEMORY, SCENE, pack
 
@@ -111,19 +112,18 @@ class PredictiveDriver:
     """
 
     def __init__(self, parameters: Parameters | None = None, eps: float = 1e-5) -> None:
-        self._parameters = pack(Parameters() if parameters is None else parameters)
         self._eps = eps
-        n = 2 * int(self._parameters["driver"]["H_c"]) + 1
-        rows = 2 * int(self._parameters["driver"]["H_p"]) + int(self._parameters["internal_model"]["active"])
-        self.P, self.q = np.zeros((n, n)), np.zeros(n)
-        self.A = np.zeros((rows + n, n))
-        self.low, self.high = np.zeros(rows + n), np.zeros(rows + n)
+        p = Parameters() if parameters is None else parameters
+        self._parameters = pack(p)
+        n, rows = count_variables(p), count_rows(p)
+        self.P, self.q, self.A = np.zeros((n, n)), np.zeros(n), np.zeros((rows, n))
+        self.low, self.high = np.zeros(rows), np.zeros(rows)
         self._work = np.zeros((), WORKSPACE)
         limits = self._parameters["limits"]
         self._bounds = np.array([limits["a_max"], limits["delta_max"]])
         # Entries that may differ from zero, in the order of compressed columns.
         self._P_columns, self._P_rows = np.nonzero(np.tri(n))
-        pattern = np.vstack([np.ones((rows, n)), np.eye(n)])
+        pattern = np.vstack([np.ones((rows - n, n)), np.eye(n)])
         self._A_columns, self._A_rows = np.nonzero(pattern.T)
         self._P_pattern, self._A_pattern = sparse.csc_matrix(np.tri(n).T), sparse.csc_matrix(pattern)
         self.reset()

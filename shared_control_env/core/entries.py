@@ -12,8 +12,8 @@ import numpy as np
 
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.control import automation, driver, driver_lag, person
+from shared_control_env.core.world import actuator, vehicle
 from shared_control_env.core.world import traffic as traffic_model
-from shared_control_env.core.world import vehicle
 
 Boxed: TypeAlias = Any
 """A record held in a 0-d array."""
@@ -22,17 +22,22 @@ _automate = automation.AUTOMATE.call
 
 
 @jit
-def step_plant(state: np.ndarray, a: float, delta: float, dt: float, parameters: Boxed, work: Boxed) -> None:
-    """Advance the plant by one step, see :func:`world.vehicle.plant_step`.
+def step_plant(
+    state: np.ndarray, u: np.ndarray, realised: np.ndarray, dt: float, parameters: Boxed, work: np.ndarray
+) -> None:
+    """Advance actuators and plant by one step, see :mod:`world.actuator` and :func:`world.vehicle.plant_step`.
 
     Args:
         state: ego ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
-        a, delta: command [m/s^2, rad], held over the step.
+        u: command ``[a, delta]`` [m/s^2, rad], held over the step, shape (2,).
+        realised: output of the actuators [m/s^2, rad], overwritten, shape (2,).
         dt: step [s].
         parameters: :class:`core.parameters.Parameters`, a 0-d array.
         work: scratch, shape (2, 6).
     """
-    vehicle.plant_step(state, a, delta, dt, parameters[()].vehicle, work)
+    p = parameters[()]
+    actuator.actuate(u, dt, p.actuator, realised)
+    vehicle.plant_step(state, realised[0], realised[1], dt, p.vehicle, work)
 
 
 @jit
@@ -121,8 +126,9 @@ def build_program(
         u_h_act: the driver's present actual command [m/s^2, rad], shape (2,).
         parameters: :class:`core.parameters.Parameters`, a 0-d array.
         work: record of :data:`condensing.WORKSPACE`, a 0-d array.
-        P, q: quadratic and linear cost, written, shapes (n + 1, n + 1) and (n + 1,) with n = 2 H_c.
-        A: constraint matrix, written, shape (:func:`control.driver.count_rows`, n + 1).
+        P: quadratic cost, written, shape (n, n) with n = :func:`control.driver.count_variables`.
+        q: linear cost, written, shape (n,).
+        A: constraint matrix, written, shape (:func:`control.driver.count_rows`, n).
         low, high: bounds of the rows of A, written, one entry per row.
     """
     driver.build_program(scene[()], u_last, u_h_act, parameters[()], work[()], P, q, A, low, high)

@@ -133,7 +133,7 @@ def begin(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
     clear_automation(batch.automations[i])
     clear_signals(batch.signals[i])
     clear_transition(batch.transitions[i])
-    clear_report(batch.parameters[i].person.engaged, out.drivers[i])
+    clear_report(batch.parameters[i], out.drivers[i])
 
 
 @jit_inlined
@@ -404,7 +404,7 @@ def judge(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> Non
     if not automated:
         decide_automation(see(e, works[0]), e, setup.calls, works[0])
     degrade_command(e)
-    assess(setup.calls.assess, e.scene, e.traffic, e.line, e.p, e.signals)
+    assess(setup.calls.assess, e.scene, e.traffic, e.line, e.p, e.signals, works[0].motion)
 
 
 @jit

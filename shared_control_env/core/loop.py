@@ -16,7 +16,7 @@ of the allocator and of the driver, which :mod:`core.kernel` fills::
     (driver)             u_h,des    the driver's desired command (Eq. 14, 15)
     apply_driver         u_h,act    the driver's actual command (Eq. 16)
                          u          command of the vehicle: u_a,act + u_h,act, clipped to the limits
-    move                            vehicle (Eq. 11) and traffic, to k + 1
+    move                            actuators, vehicle (Eq. 11) and traffic, to k + 1
     evaluate                        reward and end of the episode, after plan has run at k + 1
 """
 
@@ -56,7 +56,7 @@ def plan(k: int, e: Environment, calls: Calls, work: Work) -> None:
     find_safe_area(e, calls, work)
     decide_automation(see(e, work), e, calls, work)
     degrade_command(e)
-    assess(calls.assess, e.scene, e.traffic, e.line, e.p, e.signals)
+    assess(calls.assess, e.scene, e.traffic, e.line, e.p, e.signals, work.motion)
 
 
 @jit_inlined
@@ -189,12 +189,13 @@ def move(e: Environment, setup: Setup, work: Work) -> None:
     """Move all vehicles to the next time step (:func:`core.world.motion.move`).
 
     Args:
-        e: the environment; its state, traffic and transition are written.
+        e: the environment; its state, traffic, actuators and transition are written.
         setup: number and duration of the simulation steps.
         work: scratch.
     """
     address, k, frames, dt = setup.calls.move, e.scene.k, setup.frames, setup.dt
-    move_all(address, k, frames, dt, e.signals, e.p, e.state, e.traffic, e.plans, e.line, e.transition, work.motion)
+    memory, transition, motion = e.memory, e.transition, work.motion
+    move_all(address, k, frames, dt, e.signals, e.p, e.state, e.traffic, e.plans, e.line, memory, transition, motion)
 
 
 @jit_inlined
@@ -261,7 +262,7 @@ def clear_memory(memory: Memory) -> None:
         memory: record of :data:`records.MEMORY`, overwritten.
     """
     for i in range(2):
-        memory.u_h_act[i] = memory.u_h_des[i] = memory.u[i] = 0.0
+        memory.u_h_act[i] = memory.u_h_des[i] = memory.u[i] = memory.realised[i] = 0.0
     memory.in_lane = True
     memory.lane_departures = 0
     memory.driver_failures = 0

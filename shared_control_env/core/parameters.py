@@ -45,6 +45,8 @@ Inertia = Annotated[float, Interval(ge=10.0, le=1e6)]  # [kg m^2], for the same 
 BodyLength = Annotated[float, Interval(ge=0.1, le=30.0)]  # [m], for the same range of vehicles
 BodyWidth = Annotated[float, Interval(ge=0.1, le=5.0)]  # [m]
 Stiffness = Annotated[float, Interval(ge=1e3, le=1e7)]  # [N/rad]
+Friction = Annotated[float, Interval(ge=0.05, le=2.0)]  # [-], from wet ice to racing tyres
+ActuatorLag = Annotated[float, Interval(ge=0.0, le=10.0)]  # [s]
 
 
 class VehicleParameters(NamedTuple):
@@ -59,7 +61,7 @@ class VehicleParameters(NamedTuple):
         C_r: cornering stiffness of one rear tyre [N/rad]; ours (the paper prints none).
         length: body length [m]; that of highway-env's vehicle.
         width: body width v_w [m]; paper, Table V.
-        mu: friction coefficient of tyre and road [-]; ours. The linear tyres of Eq. 11 do not use it.
+        mu: friction coefficient of tyre and road [-]; ours: a dry road. The linear tyres of Eq. 11 do not use it.
         tyre: address of the compiled tyre force (:mod:`core.world.tyre`); 0 for the linear tyres of Eq. 11.
     """
 
@@ -71,8 +73,24 @@ class VehicleParameters(NamedTuple):
     C_r: Stiffness = 60_000.0
     length: BodyLength = 5.0
     width: BodyWidth = 2.0
-    mu: Annotated[float, Interval(ge=0.05, le=2.0)] = 0.9
+    mu: Friction = 0.9
     tyre: int = 0
+
+
+class ActuatorParameters(NamedTuple):
+    """Actuators between the command u and the car (:mod:`core.world.actuator`); all ours. The paper has none.
+
+    Attributes:
+        acceleration_lag: time constant of drive and brake [s]; 0 for none.
+        steering_lag: time constant of the steering [s]; 0 for none.
+        acceleration_rate: largest rate of the acceleration [m/s^3]; infinite for none.
+        steering_rate: largest rate of the steering angle [rad/s]; infinite for none.
+    """
+
+    acceleration_lag: ActuatorLag = 0.0
+    steering_lag: ActuatorLag = 0.0
+    acceleration_rate: Positive = math.inf
+    steering_rate: Positive = math.inf
 
 
 class Limits(NamedTuple):
@@ -479,7 +497,9 @@ class Parameters(NamedTuple):
 
     Attributes:
         vehicle: the ego vehicle as it drives.
-        model: the ego vehicle as controllers, person and risk assessment model it, with linear tyres.
+        model: the ego vehicle as controllers, person and risk assessment model it. Controllers and person use it with
+            linear tyres, the risk assessment with the tyre that it names.
+        actuator: lag and rate limit of the car's actuators.
         limits: limits of the commands.
         automation: horizon and weights of the automation's predictive controller.
         driver: horizon and weights of the driver's predictive controller; the paper uses those of the automation.
@@ -498,6 +518,7 @@ class Parameters(NamedTuple):
 
     vehicle: VehicleParameters = VehicleParameters()
     model: VehicleParameters = VehicleParameters()
+    actuator: ActuatorParameters = ActuatorParameters()
     limits: Limits = Limits()
     automation: PredictiveParameters = PredictiveParameters()
     driver: PredictiveParameters = PredictiveParameters()

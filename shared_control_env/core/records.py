@@ -110,6 +110,7 @@ class Scene:
         y_target: lateral position to track [m].
         v_target: speed to track [m/s].
         changing: whether a lane change is under way.
+        change_weight: share of the weights of a lane change in the longitudinal risk [-].
         felt: the automation's actual command of the previous step, felt at wheel and pedal [m/s^2, rad].
         displayed: alpha_a of the previous step, as displayed to the driver [-].
         neighbours: rows of the follower, the leader and the preceding vehicle, columns PRESENT to NEAR_ROW.
@@ -127,6 +128,7 @@ class Scene:
     y_target: float
     v_target: float
     changing: bool
+    change_weight: float
     felt: Vector2
     displayed: float
     neighbours: Annotated[np.ndarray, (3, 5)]
@@ -215,6 +217,7 @@ class Memory:
         u_h_act: state of the driver's lag [m/s^2, rad].
         u_h_des: the driver's last desired command [m/s^2, rad].
         u: last command of the vehicle [m/s^2, rad].
+        realised: what the actuators have made of the commands u so far [m/s^2, rad].
         in_lane: whether the ego's centre is in the lane to keep.
         lane_departures: number of times that the ego's centre has left the lane to keep.
         driver_failures: number of steps at which the solver of the kernel's driver failed.
@@ -223,6 +226,7 @@ class Memory:
     u_h_act: Vector2
     u_h_des: Vector2
     u: Vector2
+    realised: Vector2
     in_lane: bool
     lane_departures: Int32
     driver_failures: Int32
@@ -238,6 +242,7 @@ class PersonMemory:
             deviation [-].
         engaged: whether the person drives; if not, the hands rest.
         noticed: time at which the person noticed something [s]; infinite before.
+        response: this person's time from noticing to acting [s]; 0 for one who drives from the start.
         reason: what the person noticed, index in person.REASONS.
     """
 
@@ -246,6 +251,7 @@ class PersonMemory:
     error: Annotated[np.ndarray, (4,)]
     engaged: bool
     noticed: float
+    response: float
     reason: int
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.core.faults.kinds import KINDS
-from shared_control_env.core.parameters import Limits
+from shared_control_env.core.parameters import PERSONS, Limits
 from shared_control_env.envs.degradations import draw_degradation
 from shared_control_env.envs.settings import CUT_OFF, RandomSettings, Settings, check, plain
 from shared_control_env.envs.settings.changes import at
@@ -21,16 +21,17 @@ def is_random(settings: Settings) -> bool:
         settings: settings of the environment.
     """
     noisy = any(KINDS[fault.kind].draws and fault.seed is None for fault in settings.faults)
-    person = settings.person.active and settings.person.seed is None
-    return bool(settings.randomise or settings.degradations or noisy or person)
+    person = settings.has_person and settings.person.seed is None
+    return bool(settings.randomise or settings.degradations or settings.persons or noisy or person)
 
 
 def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
     """Draw the settings of one episode.
 
-    The draws are the entries of ``randomise`` in their order, one of ``degradations``, the seeds of noise, and the
-    seed of the person. If a person drives, the settings that concern the driver and the seed of the person come from a
-    separate generator. A seed then gives the same road, traffic and degradations for every driver.
+    The draws are one of ``persons``, the entries of ``randomise`` in their order, one of ``degradations``, the seeds of
+    noise, and the seed of the person. If a person drives, the person, the settings that concern the driver and the seed
+    of the person come from a separate generator. A seed then gives the same road, traffic and degradations for every
+    driver.
 
     Args:
         settings: settings of the environment.
@@ -46,6 +47,9 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
         return settings
     config = plain(settings)
     own = rng.spawn(1)[0] if settings.has_person else rng
+    if settings.persons:
+        person = PERSONS[settings.persons[int(own.integers(len(settings.persons)))]]
+        config["person"], config["persons"] = {**person._asdict(), "seed": settings.person.seed}, []
     for entry in settings.randomise:
         _draw_setting(config, entry, own if _concerns_driver(entry) else rng)
     drawn: list[dict[str, Any]] = []

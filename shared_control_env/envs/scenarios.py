@@ -1,4 +1,4 @@
-"""The registered scenarios as settings: the paper's two cases, and eight scenarios drawn within ranges."""
+"""The registered scenarios as settings: the paper's two cases, and ten scenarios drawn within ranges."""
 
 from __future__ import annotations
 
@@ -31,12 +31,22 @@ def _choose(setting: str, *choices: float) -> dict[str, Any]:
     return {"setting": setting, "choices": list(choices)}
 
 
-DRAWN_V0 = (
+DRAWN_V1 = (
     *("bias_ramp", "step_bias", "loss_of_effectiveness", "stuck", "rate_limit", "saturation", "delay"),
     *("white_noise", "coloured_noise", "oscillation", "drop_out", "intermittent", "sign_error"),
     *("lane_offset", "missed_lead", "complete_failure"),
 )
-"""Degradations that the drawn scenarios of version 0 draw from. Degradations added to the library are not included."""
+"""Degradations that the drawn scenarios of version 1 draw from. Degradations added to the library are not included."""
+
+ON_THE_ROAD: dict[str, Any] = {
+    "degradations": list(DRAWN_V1),
+    "vehicle": {"tyre": "fiala"},
+    "task": {"time_headway": 1.2},
+}
+"""Settings that all drawn scenarios share: degradations, tyres that slide, and a time headway that is kept.
+
+1.2 s lies between the smallest time headway of ISO 15622 (0.8 s) and the 1.5 s of highway-env's drivers.
+"""
 
 _CURVATURES = [sign / radius for radius in (60.0, 80.0, 120.0, 200.0) for sign in (1.0, -1.0)]
 """Curvatures of the drawn curves, to the left and to the right [1/m]."""
@@ -45,7 +55,7 @@ _BEND_ROAD = {"segments": [{"length": 25.0, "curvature": 0.0}, {"length": 250.0,
 """A straight segment, then an arc whose curvature is drawn."""
 
 TWO_LANE = Scenario(
-    id="SharedControl/TwoLane-v0",
+    id="SharedControl/TwoLane-v1",
     description="Case 1: straight, two lanes, following a slower vehicle at 12 m/s; steering drifts off by 0.3 rad",
     settings={
         "vehicles": [
@@ -60,7 +70,7 @@ TWO_LANE = Scenario(
 """Case 1 (Section VI-B, Table VI): lane keeping behind a slower vehicle on a straight road; the steering degrades."""
 
 CURVE = Scenario(
-    id="SharedControl/Curve-v0",
+    id="SharedControl/Curve-v1",
     description="Case 2: curve of 60 m radius behind a vehicle at 12 m/s; acceleration drifts off by 3 m/s^2",
     settings={
         "road": {"segments": [{"length": 300.0, "curvature": 1.0 / 60.0}]},
@@ -74,7 +84,7 @@ CURVE = Scenario(
 """Case 2 (Section VI-C): following a vehicle round a curve of 60 m radius; the acceleration degrades."""
 
 LANE_KEEPING = Scenario(
-    id="SharedControl/LaneKeeping-v0",
+    id="SharedControl/LaneKeeping-v1",
     description="straight, two lanes: keep the lane behind a slower vehicle, with others beside",
     settings={
         "vehicles": [
@@ -82,7 +92,7 @@ LANE_KEEPING = Scenario(
             {"lane": 1, "position": 30.0, "speed": 15.0},
             {"lane": 1, "position": -15.0, "speed": 13.0},
         ],
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "randomise": [
             _draw("ego.speed", 12.0, 18.0),
             _draw("ego.lateral_offset", -0.3, 0.3),
@@ -98,12 +108,12 @@ LANE_KEEPING = Scenario(
 )
 
 BEND = Scenario(
-    id="SharedControl/Bend-v0",
+    id="SharedControl/Bend-v1",
     description="a curve of 60 to 200 m radius to either side, free road",
     settings={
         "road": _BEND_ROAD,
         "ego": {"speed": 12.0},
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "screen_height": 632,
         "randomise": [
             _choose("road.segments.1.curvature", *_CURVATURES),
@@ -115,7 +125,7 @@ BEND = Scenario(
 )
 
 S_CURVE = Scenario(
-    id="SharedControl/SCurve-v0",
+    id="SharedControl/SCurve-v1",
     description="an S-curve, two arcs of 60 to 200 m radius, free road",
     settings={
         "road": {
@@ -127,7 +137,7 @@ S_CURVE = Scenario(
             ]
         },
         "ego": {"speed": 12.0},
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "screen_height": 632,
         "randomise": [
             _draw("road.segments.1.curvature", 1.0 / 200.0, 1.0 / 60.0),
@@ -140,7 +150,7 @@ S_CURVE = Scenario(
 )
 
 LANE_CHANGE = Scenario(
-    id="SharedControl/LaneChange-v0",
+    id="SharedControl/LaneChange-v1",
     description="change to the left lane past a slower vehicle; both lanes are the driving region",
     settings={
         "lane_change": {"onset": 1.5, "duration": 4.0, "lane": 1},
@@ -149,7 +159,7 @@ LANE_CHANGE = Scenario(
             {"lane": 1, "position": 45.0, "speed": 15.0},
             {"lane": 1, "position": -20.0, "speed": 13.0},
         ],
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "randomise": [
             _draw("lane_change.onset", 1.0, 2.0),
             _draw("lane_change.duration", 3.5, 5.0),
@@ -165,7 +175,7 @@ LANE_CHANGE = Scenario(
 )
 
 CUT_IN = Scenario(
-    id="SharedControl/CutIn-v0",
+    id="SharedControl/CutIn-v1",
     description="a vehicle from the left lane cuts in before the ego",
     settings={
         "vehicles": [
@@ -177,7 +187,7 @@ CUT_IN = Scenario(
             },
             {"lane": 0, "position": 60.0, "speed": 13.0},
         ],
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "randomise": [
             _draw("ego.speed", 13.0, 15.0),
             _draw("vehicles.0.position", 14.0, 20.0),
@@ -190,7 +200,7 @@ CUT_IN = Scenario(
 )
 
 LEAD_BRAKING = Scenario(
-    id="SharedControl/LeadBraking-v0",
+    id="SharedControl/LeadBraking-v1",
     description="the vehicle ahead brakes hard, to a stop",
     settings={
         "ego": {"speed": 14.0},
@@ -198,7 +208,7 @@ LEAD_BRAKING = Scenario(
             {"lane": 0, "position": 30.0, "speed": 14.0, "brake": {"onset": 2.5, "deceleration": 4.5}},
             {"lane": 1, "position": -15.0, "speed": 14.0},
         ],
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "randomise": [
             _draw("ego.speed", 13.0, 15.0),
             _draw("vehicles.0.position", 25.0, 40.0),
@@ -214,7 +224,7 @@ _DENSE = [(0, 22.0), (0, 44.0), (0, 66.0), (0, -20.0), (1, 8.0), (1, 30.0), (1, 
 """Lane and nominal position [m] of each vehicle of dense traffic; positions are drawn within 4 m of these."""
 
 DENSE_TRAFFIC = Scenario(
-    id="SharedControl/DenseTraffic-v0",
+    id="SharedControl/DenseTraffic-v1",
     description="eight vehicles that follow one another and the ego by the Intelligent Driver Model",
     settings={
         "ego": {"speed": 10.0},
@@ -222,7 +232,7 @@ DENSE_TRAFFIC = Scenario(
             {"lane": lane, "position": position, "speed": 10.0, "behaviour": "idm", "desired_speed": 13.0}
             for lane, position in _DENSE
         ],
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "randomise": [
             _draw("ego.speed", 9.0, 11.0),
             *(
@@ -239,19 +249,71 @@ DENSE_TRAFFIC = Scenario(
 )
 
 CURVE_WITH_LEAD = Scenario(
-    id="SharedControl/CurveWithLead-v0",
+    id="SharedControl/CurveWithLead-v1",
     description="a curve of 60 to 200 m radius to either side behind a vehicle that follows the road at 9 to 12 m/s",
     settings={
         "road": _BEND_ROAD,
         "ego": {"speed": 12.0},
         "vehicles": [{"lane": 0, "position": 20.0, "speed": 11.0}],
-        "degradations": list(DRAWN_V0),
+        **ON_THE_ROAD,
         "screen_height": 632,
         "randomise": [
             _choose("road.segments.1.curvature", *_CURVATURES),
             _draw("ego.speed", 10.0, 13.0),
             _draw("vehicles.0.position", 15.0, 25.0),
             _draw("vehicles.0.speed", 9.0, 12.0),
+        ],
+    },
+)
+
+WET_ROAD = Scenario(
+    id="SharedControl/WetRoad-v1",
+    description="a wet curve of 60 to 200 m radius to either side (friction 0.5), behind a vehicle at 8 to 11 m/s",
+    settings={
+        **ON_THE_ROAD,
+        "road": _BEND_ROAD,
+        "ego": {"speed": 11.0},
+        "vehicle": {"tyre": "fiala", "mu": 0.5},
+        "vehicles": [{"lane": 0, "position": 25.0, "speed": 10.0}],
+        "screen_height": 632,
+        "randomise": [
+            _choose("road.segments.1.curvature", *_CURVATURES),
+            _draw("ego.speed", 9.0, 12.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 9.0, 12.0),
+            _draw("vehicles.0.position", 20.0, 40.0),
+            _draw("vehicles.0.speed", 8.0, 11.0),
+        ],
+    },
+)
+
+MOTORWAY = Scenario(
+    id="SharedControl/Motorway-v1",
+    description="a motorway at 25 to 33 m/s, curves of 500 to 1500 m radius, behind a vehicle and beside others",
+    settings={
+        **ON_THE_ROAD,
+        "road": {"segments": [{"length": 50.0, "curvature": 0.0}, {"length": 450.0, "curvature": 1.0 / 1000.0}]},
+        "ego": {"speed": 29.0},
+        "task": {"time_headway": 1.2, "target_speed": 29.0},
+        "vehicles": [
+            {"lane": 0, "position": 80.0, "speed": 26.0},
+            {"lane": 1, "position": 50.0, "speed": 31.0},
+            {"lane": 1, "position": -40.0, "speed": 30.0},
+        ],
+        "screen_height": 632,
+        "randomise": [
+            _choose(
+                "road.segments.1.curvature", *(sign / r for r in (500.0, 750.0, 1000.0, 1500.0) for sign in (1, -1))
+            ),
+            _draw("ego.speed", 25.0, 33.0),
+            _draw("ego.lateral_offset", -0.3, 0.3),
+            _draw("task.target_speed", 25.0, 33.0),
+            _draw("vehicles.0.position", 60.0, 110.0),
+            _draw("vehicles.0.speed", 24.0, 30.0),
+            _draw("vehicles.1.position", 30.0, 80.0),
+            _draw("vehicles.1.speed", 28.0, 34.0),
+            _draw("vehicles.2.position", -48.0, -25.0),
+            _draw("vehicles.2.speed", 26.0, 32.0),
         ],
     },
 )
@@ -267,6 +329,8 @@ SCENARIOS: dict[str, Scenario] = {
     "lead_braking": LEAD_BRAKING,
     "dense_traffic": DENSE_TRAFFIC,
     "curve_with_lead": CURVE_WITH_LEAD,
+    "wet_road": WET_ROAD,
+    "motorway": MOTORWAY,
 }
 """All scenarios by the name that the benchmark and the entry points use."""
 

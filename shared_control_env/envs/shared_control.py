@@ -268,6 +268,7 @@ class SharedControlEnv(HighwayEnv):
         states, traffic = np.zeros((1, 6)), np.zeros((1, len(others), 8))
         plans = np.zeros((1, len(others)), batch.plans.dtype)
         states[0], ego.array, ego.parameters = ego.array, states[0], self.parameters
+        ego.realised = self.memory["realised"]
         for j, vehicle in enumerate(others):
             if isinstance(vehicle, LaneFollower):
                 plan = plans[0, j : j + 1].reshape(())

@@ -25,7 +25,7 @@ from shared_control_env.controllers.scripted import (
 from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.core.parameters import IDENTIFIED_DRIVERS, PERSONS, PersonParameters, fitted_arms
 from shared_control_env.envs.degradations import DEGRADATIONS
-from shared_control_env.envs.scenarios import DRAWN_V0, SCENARIOS
+from shared_control_env.envs.scenarios import DRAWN_V1, SCENARIOS
 from shared_control_env.envs.settings import as_plain
 from shared_control_env.nearest import hint, nearest
 
@@ -90,15 +90,18 @@ def _lag(name: str) -> dict[str, Any]:
     return {"driver_lag": IDENTIFIED_DRIVERS[name]._asdict()}
 
 
+_ARMS = tuple(
+    {"setting": f"driver_lag.{field}", "median": median, "spread": spread}
+    for field, (median, spread) in zip(("K_h", "T_h"), fitted_arms(), strict=True)
+)
+"""Draws of an arm around the five that the paper identified."""
+
+
 def _person(name: str, description: str) -> DriverEntry:
     """Entry for a person of :data:`core.parameters.PERSONS`. The arm is drawn around the five of the paper."""
     person, default = PERSONS[name]._asdict(), PersonParameters()._asdict()
     differing = {field: value for field, value in person.items() if value != default[field]}
-    draws = tuple(
-        {"setting": f"driver_lag.{field}", "median": median, "spread": spread}
-        for field, (median, spread) in zip(("K_h", "T_h"), fitted_arms(), strict=True)
-    )
-    return DriverEntry(description, config={"internal_model": {"active": True}, "person": differing}, draws=draws)
+    return DriverEntry(description, config={"internal_model": {"active": True}, "person": differing}, draws=_ARMS)
 
 
 DRIVERS: dict[str, DriverEntry] = {
@@ -116,6 +119,11 @@ DRIVERS: dict[str, DriverEntry] = {
     ),
     "hands_on": _person("hands_on", "person with hands at rest on the wheel, who notices, and acts a while later"),
     "hands_off": _person("hands_off", "person without hands on the wheel, who feels little and takes longer"),
+    "population": DriverEntry(
+        "one of these three in each episode, with a delay of perception of 0.15 to 0.25 s",
+        config={"internal_model": {"active": True}, "persons": list(PERSONS)},
+        draws=(*_ARMS, {"setting": "person.delay", "low": 0.15, "high": 0.25}),
+    ),
     "scripted": DriverEntry("Stanley's law, speed and distance by the Intelligent Driver Model", ScriptedDriver),
     "distracted": DriverEntry("lets go until 1 s after the authority falls, then recovers", DistractedDriver),
     "over_reacting": DriverEntry("the scripted driver, 2.5 times as hard", OverreactingDriver),
@@ -140,12 +148,12 @@ AUTHORITIES: dict[str, AuthorityEntry] = {
 SUITES: dict[str, Suite] = {
     "paper": Suite("the paper's two cases with their own faults", ("two_lane", "curve"), (None,)),
     "full": Suite(
-        "eight drawn scenarios x every degradation and none",
+        "ten drawn scenarios x every degradation and none",
         (
             *("lane_keeping", "bend", "s_curve", "lane_change", "cut_in"),
-            *("lead_braking", "dense_traffic", "curve_with_lead"),
+            *("lead_braking", "dense_traffic", "curve_with_lead", "wet_road", "motorway"),
         ),
-        ("none", *DRAWN_V0),
+        ("none", *DRAWN_V1),
     ),
 }
 """Suites by name."""

@@ -18,10 +18,10 @@ import shared_control_env
 from shared_control_env.controllers.allocators import Allocator, checked_authority
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.controllers.driver import Driver, checked_command
-from shared_control_env.core.parameters import TRAFFIC_BODY
+from shared_control_env.core.parameters import PERSONS, TRAFFIC_BODY
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
 from shared_control_env.envs.scenarios import SCENARIOS
-from shared_control_env.envs.settings import change, defaults, plain
+from shared_control_env.envs.settings import Settings, change, defaults, plain
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
 from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
 from shared_control_env.evaluation.metrics import Trajectory, measure_all
@@ -276,6 +276,7 @@ class Recorder:
             lane_width=settings.road.lane_width,
             speed=value["z"][:, 3],
             target_speed=value["v_target"],
+            lateral_speed=value["z"][:, 4],
             yaw_rate=value["z"][:, 5],
             command=value["u"] / limits,
             delta_max=settings.limits.delta_max,
@@ -347,8 +348,8 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
         frames: list to which pictures of all episodes before each step are appended; None for no pictures.
 
     Returns:
-        One row per episode: identity, end, the driver's K_h [-] and T_h [s], the time at which a person at rest noticed
-        something [s], all metrics, and the versions.
+        One row per episode: identity, end, the driver's K_h [-] and T_h [s], the person at the wheel, the time at which
+        a person at rest noticed something [s], all metrics, and the versions.
     """
     begin = perf_counter()
     env = make_environment(batch, None if frames is None else "rgb_array")
@@ -379,6 +380,7 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
             "terminated": bool(recorder.crashed[i] or recorder.left_road[i]),
             "duration": recorder.lengths[i] / drawn[i].policy_frequency,
             **plain(drawn[i])["driver_lag"],
+            "person": person_of(drawn[i]),
             "noticed": recorder.noticed[i],
             **measure_all(recorder.trajectory(i, drawn[i], wall_time)),
             "config_hash": config_hash(batch.scenario, configs[i]),
@@ -387,6 +389,18 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
         }
         for i, (degradation, seed) in enumerate(batch.episodes)
     ]
+
+
+def person_of(settings: Settings) -> str:
+    """Name of the person at the wheel: a key of :data:`core.parameters.PERSONS`, ``own``, or empty without a person.
+
+    Args:
+        settings: settings of one episode.
+    """
+    if not settings.has_person:
+        return ""
+    fields = {key: value for key, value in plain(settings)["person"].items() if key not in ("seed", "delay")}
+    return next((name for name, each in PERSONS.items() if fields.items() <= each._asdict().items()), "own")
 
 
 def config_hash(scenario: str, changes: Mapping[str, Any]) -> str:

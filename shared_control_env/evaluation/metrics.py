@@ -39,6 +39,7 @@ class Trajectory:
         lane_width: width of a lane [m].
         speed: longitudinal speed v_x, shape (T,) [m/s].
         target_speed: target speed, shape (T,) [m/s].
+        lateral_speed: lateral velocity v_y in the body frame, shape (T,) [m/s].
         yaw_rate: yaw rate r, shape (T,) [rad/s].
         command: command u of the vehicle, ``[a, delta]`` as shares of the limits, shape (T, 2) [-].
         delta_max: limit of the steering angle [rad].
@@ -59,6 +60,7 @@ class Trajectory:
     lane_width: float
     speed: np.ndarray
     target_speed: np.ndarray
+    lateral_speed: np.ndarray
     yaw_rate: np.ndarray
     command: np.ndarray
     delta_max: float
@@ -97,7 +99,19 @@ class Metric(NamedTuple):
 
 
 IDENTITY = (
-    *("scenario", "degradation", "driver", "authority", "seed", "terminated", "duration", "K_h", "T_h", "noticed"),
+    *(
+        "scenario",
+        "degradation",
+        "driver",
+        "authority",
+        "seed",
+        "terminated",
+        "duration",
+        "K_h",
+        "T_h",
+        "person",
+        "noticed",
+    ),
     *("config_hash", "version", "versions"),
 )
 """Columns of the table that are no metrics."""
@@ -285,16 +299,27 @@ def steering_reversal_rate(t: Trajectory) -> float:
     return 60.0 * reversals / (len(steering) * t.dt)
 
 
+def _lateral_acceleration(t: Trajectory) -> np.ndarray:
+    """Mean lateral acceleration of every time step but the last, v_y' + v_x r, shape (T - 1,) [m/s^2].
+
+    v_x r alone is the lateral acceleration in steady cornering only; where the car yaws under steering that alternates,
+    it is several times what the tyres can transmit.
+    """
+    turning = t.speed * t.yaw_rate
+    return np.diff(t.lateral_speed) / t.dt + 0.5 * (turning[1:] + turning[:-1])
+
+
 @metric("m/s^2", "lower")
 def lateral_acceleration_max(t: Trajectory) -> float:
-    """Largest |v_x r|; ISO 11270 allows 3 m/s^2."""
-    return float(np.abs(t.speed * t.yaw_rate).max())
+    """Largest |v_y' + v_x r|, averaged over a time step; ISO 11270 allows 3 m/s^2; not defined for a single step."""
+    lateral = np.abs(_lateral_acceleration(t))
+    return float(lateral.max()) if len(lateral) else np.nan
 
 
 def _lateral_jerk(t: Trajectory) -> np.ndarray:
-    """Magnitude of the change of v_x r over half a second, divided by that time [m/s^3]."""
+    """Magnitude of the change of the lateral acceleration over half a second, divided by that time [m/s^3]."""
     n = max(1, round(JERK_WINDOW / t.dt))
-    lateral = t.speed * t.yaw_rate
+    lateral = _lateral_acceleration(t)
     return np.abs(lateral[n:] - lateral[:-n]) / (n * t.dt)
 
 
@@ -308,10 +333,10 @@ def lateral_jerk_max(t: Trajectory) -> float:
 @metric("-", "lower")
 def iso_11270_violation(t: Trajectory) -> float:
     """Share of the time with a lateral acceleration over 3 m/s^2 or a lateral jerk, over 0.5 s, over 5 m/s^3."""
-    beyond = np.abs(t.speed * t.yaw_rate) > LATERAL_ACCELERATION_LIMIT
+    beyond = np.abs(_lateral_acceleration(t)) > LATERAL_ACCELERATION_LIMIT
     jerk = _lateral_jerk(t) > LATERAL_JERK_LIMIT
     beyond[len(beyond) - len(jerk) :] |= jerk
-    return float(beyond.mean())
+    return float(beyond.mean()) if len(beyond) else np.nan
 
 
 @metric("m/s^3", "lower")

@@ -81,8 +81,8 @@ def evaluate(
 
     Returns:
         One row per episode: scenario, degradation, driver, authority, seed, whether it was terminated, its
-        duration [s], the driver's K_h [-] and T_h [s], the time at which a person at rest noticed something [s], every
-        metric of :data:`metrics.METRICS`, the digest of its settings, and the versions.
+        duration [s], the driver's K_h [-] and T_h [s], the person at the wheel, the time at which that person noticed
+        something [s], every metric of :data:`metrics.METRICS`, the digest of its settings, and the versions.
 
     Raises:
         ValueError: for unknown names, with the nearest and all valid ones; for an entry that does not make a driver or
@@ -161,7 +161,8 @@ def _check_settings(batches: Sequence[EpisodeBatch]) -> None:
                 checked[key] = combined(scenario.settings, config)
         if checked[key].has_person and batch.driver[1].make is not None:
             raise ValueError(
-                f"config['person']['active'] = True would not act: {batch.driver[0]!r} is no driver of the kernel"
+                "the person in config['person'] or config['persons'] would not act: "
+                f"{batch.driver[0]!r} is no driver of the kernel"
             )
 
 

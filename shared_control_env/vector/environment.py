@@ -365,7 +365,7 @@ class SharedControlVectorEnv(VectorEnv):
     def _check_person(self, present: Sequence[Settings]) -> None:
         """Raise ValueError if any of the settings has a person but the driver's slot is open."""
         if not self._driver and any(settings.has_person for settings in present):
-            raise ValueError("config['person']['active'] = True would not act: it needs driver=True")
+            raise ValueError("the person in config['person'] or config['persons'] would not act: it needs driver=True")
 
     def _show(self) -> None:
         """Draw the window if there is one."""

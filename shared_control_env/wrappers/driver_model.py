@@ -77,7 +77,9 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
     def _check_person(self) -> None:
         """Raise ValueError if the settings have a person but a driver was given."""
         if self._given is not None and self.shared.settings.has_person:
-            raise ValueError("config['person']['active'] = True would not act: another driver is given")
+            raise ValueError(
+                "the person in config['person'] or config['persons'] would not act: another driver is given"
+            )
 
     def decide(self) -> np.ndarray:
         """The driver's command divided by its limits, shape (2,)."""
@@ -100,12 +102,13 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
                 "primal_residual": 0.0 if solution is None else solution.primal_residual,
                 "dual_residual": 0.0 if solution is None else solution.dual_residual,
                 "failures": int(getattr(self.driver, "failures", 0)),
-                **self._attention(),
+                **self._person(),
+                **{name: float(self.shared.parameters["lag"][name]) for name in ("K_h", "T_h")},
             }
         }
 
-    def _attention(self) -> dict[str, Any]:
-        """Whether a person drives, and what the person noticed and when; any other driver counts as driving."""
+    def _person(self) -> dict[str, Any]:
+        """Whether a person drives, what was noticed and when, and the response; any other driver counts as driving."""
         if not isinstance(self.driver, PersonDriver):
-            return {"engaged": True, "noticed": inf, "reason": 0}
-        return {name: self.driver.person[name].item() for name in ("engaged", "noticed", "reason")}
+            return {"engaged": True, "noticed": inf, "reason": 0, "response": 0.0}
+        return {name: self.driver.person[name].item() for name in ("engaged", "noticed", "reason", "response")}

@@ -30,7 +30,7 @@ from shared_control_env.learned.views import (
 )
 from shared_control_env.wrappers import DriverModel
 
-ID = "SharedControl/TwoLane-v0"
+ID = "SharedControl/TwoLane-v1"
 CONFIG = {"duration": 1.0, "authority": {"law": "proportional"}}
 
 
@@ -185,7 +185,7 @@ def test_a_policy_that_asks_for_little_leaves_the_wheel_alone():
     driver = LearnedDriver(Policy([(weights, little)], "tanh", False, {"task": "driver"}))
     observation, scene = np.zeros(25), np.zeros(1, SCENE)[0]
     np.testing.assert_array_equal(driver.act(observation, scene), [0.0, 0.0])
-    envs = [make_environment(["SharedControl/LaneKeeping-v0"], "driver", 2, 0) for _ in range(2)]
+    envs = [make_environment(["SharedControl/LaneKeeping-v1"], "driver", 2, 0) for _ in range(2)]
     for env in envs:
         env.reset()
     seen = [env.step(np.tile(action, (2, 1)))[0] for env, action in zip(envs, (little, np.zeros(2)), strict=True)]

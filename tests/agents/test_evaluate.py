@@ -16,7 +16,7 @@ from shared_control_env.learned.history import HISTORY
 from shared_control_env.learned.policy import Policy
 from shared_control_env.learned.views import FEATURES_OF
 
-ID = "SharedControl/Bend-v0"
+ID = "SharedControl/Bend-v1"
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def idle(tmp_path):
     return make
 
 
-@pytest.mark.parametrize(("task", "baseline"), [("driver", "mpc"), ("allocator", "proportional")])
+@pytest.mark.parametrize(("task", "baseline"), [("driver", "internal_model"), ("allocator", "proportional")])
 def test_table(idle, task, baseline):
     table = measure(task, idle(task, (0.0, 0.1)), ("bend",), 2)
     assert table["seed"].min() >= HELD_OUT_SEED
@@ -102,9 +102,9 @@ def test_losses_are_those_that_all_of_the_interval_shows(learned, lost):
 
 def test_a_difference_is_as_uncertain_as_seeds_and_episodes_are():
     table = made_up((0.3, 0.3, 0.3, 0.3, 0.3))
-    spread = table["seed"].to_numpy() * (table["name"] == "mpc")  # of the baseline, from episode to episode
-    table["collisions"] += 0.1 * spread - 0.15 * (table["name"] == "mpc")
-    (row,) = [row for row in compare(table, "driver") if row.name == f"{LEARNED} - mpc"]
+    spread = table["seed"].to_numpy() * (table["name"] == "internal_model")  # of the baseline, from episode to episode
+    table["collisions"] += 0.1 * spread - 0.15 * (table["name"] == "internal_model")
+    (row,) = [row for row in compare(table, "driver") if row.name == f"{LEARNED} - internal_model"]
     assert row.values["lateral_rms"].low == pytest.approx(0.1)
     assert row.values["lateral_rms"].high == pytest.approx(0.1)
     assert row.values["collisions"].estimate == pytest.approx(0.1)

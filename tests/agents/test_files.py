@@ -37,7 +37,7 @@ WRONG = {
     "a nonlinearity of another type": card(shape={"hidden": ["tanh"], "squashed": False}),
     "squashed by a text": card(shape={"hidden": "tanh", "squashed": "yes"}),
     "environments of another type": card(environments=5),
-    "environments that are none": card(environments=["SharedControl/None-v0"]),
+    "environments that are none": card(environments=["SharedControl/None-v1"]),
     "features of another type": card(features=None),
     "a task of another type": card(task=["driver"]),
     "an unknown task": card(task="pilot"),
@@ -86,7 +86,7 @@ def test_a_model_trained_on_normalised_observations_is_refused(tmp_path):
     from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
 
     def environments():
-        made = gym.make_vec("SharedControl/TwoLane-v0", num_envs=4, threads=1, autoreset_mode="same_step")
+        made = gym.make_vec("SharedControl/TwoLane-v1", num_envs=4, threads=1, autoreset_mode="same_step")
         return StableBaselinesVecEnv(made)
 
     for wrap, refused in ((VecNormalize, True), (lambda env: env, False)):

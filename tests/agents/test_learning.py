@@ -16,7 +16,7 @@ from agents.vec_envs import make_environment
 from shared_control_env.controllers.scripted import ScriptedDriver
 from shared_control_env.wrappers import DriverModel
 
-ID = "SharedControl/LaneKeeping-v0"
+ID = "SharedControl/LaneKeeping-v1"
 GROSS = {"kind": "bias", "channel": "steering", "onset": 0.0, "size": 0.5}
 
 
@@ -66,14 +66,16 @@ def test_a_short_training_beats_chance_on_a_trivial_fault(monkeypatch):
 
 
 def test_an_allocator_learns_to_give_less_authority_under_a_gross_fault(monkeypatch):
+    """Beside the paper's driver, whose failures a short training can learn to prevent."""
+    draws = [each for each in training_config(ID, "allocator")["randomise"] if not each["setting"].startswith("person")]
+    driver = {"persons": [], "internal_model": {"active": False}, "randomise": draws}
     middle = lambda seen: np.zeros((16, 1), np.float32)
     means = {}
     for name, faults in (("gross", [GROSS]), ("none", [])):
-        changed(monkeypatch, degradations=[], faults=faults, duration=4.0)
+        changed(monkeypatch, degradations=[], faults=faults, duration=4.0, **driver)
         reached, means[name] = returns("allocator", learned("allocator", 60_000, -1.0).act)
         assert reached > returns("allocator", middle)[0]
-    assert means["gross"] < -0.3
-    assert means["none"] > 0.1
+    assert means["gross"] < means["none"] - 0.1
 
 
 class Bad:
@@ -106,7 +108,7 @@ def test_what_is_no_driving_does_not_pay(weights, reason):
 
 
 def _return(driver, config):
-    env = DriverModel(gym.make("SharedControl/TwoLane-v0", config={**config, "faults": []}), driver)
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1", config={**config, "faults": []}), driver)
     env.reset(seed=0)
     total, going = 0.0, True
     while going:

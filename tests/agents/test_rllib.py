@@ -16,7 +16,7 @@ from shared_control_env.learned.policy import LearnedAllocator, LearnedDriver, P
 from shared_control_env.learned.views import DRIVER_FEATURES
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
 
-ID = "SharedControl/LaneKeeping-v0"
+ID = "SharedControl/LaneKeeping-v1"
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -31,7 +31,7 @@ def test_parts_and_vectors_run():
     one = vectors.kernel(1, True, 1)
     assert one.one.median > 0.0
     assert (one.all, one.ratio) == (None, 1.0)
-    several = vectors.kernel(64, False, 1, "SharedControl/DenseTraffic-v0")
+    several = vectors.kernel(64, False, 1, "SharedControl/DenseTraffic-v1")
     assert (several.all is not None) == (len(cores()) > 1)
     assert several.ratio > 0.0
     allowed = cores()

@@ -150,7 +150,7 @@ def test_the_driver_with_the_internal_model_undoes_what_it_feels():
 
 
 def test_its_arm_is_the_one_of_the_loop():
-    env = DriverModel(gym.make("SharedControl/Bend-v0", config={"internal_model": {"active": True}}))
+    env = DriverModel(gym.make("SharedControl/Bend-v1", config={"internal_model": {"active": True}}))
     env.reset(seed=0)
     for _ in range(60):
         info = env.step(0)[4]

@@ -33,7 +33,7 @@ def test_is_a_driver(cls):
     assert cls().act(observation(), scene_at()).shape == (2,)
 
 
-@pytest.mark.parametrize("name", ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"])
+@pytest.mark.parametrize("name", ["SharedControl/TwoLane-v1", "SharedControl/Curve-v1"])
 @pytest.mark.parametrize("law", ["paper", "proportional"])
 def test_keeps_the_lane_under_the_limiter(name, law):
     env = DriverModel(gym.make(name, config={"authority": {"law": law}}), ScriptedDriver())
@@ -47,7 +47,7 @@ def test_keeps_the_lane_under_the_limiter(name, law):
     assert abs(info["z"][1]) < 1.0
 
 
-@pytest.mark.parametrize("name", ["SharedControl/Bend-v0", "SharedControl/SCurve-v0", "SharedControl/LaneKeeping-v0"])
+@pytest.mark.parametrize("name", ["SharedControl/Bend-v1", "SharedControl/SCurve-v1", "SharedControl/LaneKeeping-v1"])
 def test_drives_alone(name):
     config = {"authority": {"law": "driver_only"}, "degradations": ["none"]}
     env = DriverModel(gym.make(name, config=config), ScriptedDriver())

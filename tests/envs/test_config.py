@@ -70,7 +70,7 @@ def test_refused(config, message):
 
 def test_refused_by_gym_make_too():
     with pytest.raises(ValueError, match="did you mean 'duration'"):
-        gym.make("SharedControl/TwoLane-v0", config={"duratoin": 5.0})
+        gym.make("SharedControl/TwoLane-v1", config={"duratoin": 5.0})
 
 
 def test_supercritical_within_the_models_range_warns():
@@ -117,7 +117,7 @@ def test_malformed_actions_move_nothing(action):
 
 @pytest.mark.parametrize("action", [np.array([np.nan, 0.0]), np.zeros(3), np.zeros((1, 2))])
 def test_malformed_actions_of_the_limited_environment(action):
-    env = gym.make("SharedControl/TwoLane-v0", disable_env_checker=True)
+    env = gym.make("SharedControl/TwoLane-v1", disable_env_checker=True)
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"action\['driver'\]"):
         env.step(action)

@@ -103,13 +103,13 @@ def test_made_by_id_with_the_limiter_applied(name):
 
 
 def test_made_by_module_and_id_in_a_fresh_process():
-    code = "import gymnasium as gym; print(gym.make('shared_control_env:SharedControl/TwoLane-v0').spec.id)"
+    code = "import gymnasium as gym; print(gym.make('shared_control_env:SharedControl/TwoLane-v1').spec.id)"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == "SharedControl/TwoLane-v0"
+    assert result.stdout.strip() == "SharedControl/TwoLane-v1"
 
 
 def test_spawned_workers_make_it():
-    name = "shared_control_env:SharedControl/Curve-v0"
+    name = "shared_control_env:SharedControl/Curve-v1"
     envs = gym.vector.AsyncVectorEnv([lambda: gym.make(name)] * 2, context="spawn")
     observations, _ = envs.reset(seed=[1, 2])
     assert observations.shape == (2, DRIVER_V0.size)
@@ -364,7 +364,7 @@ def test_gymnasium_step_api_after_reset_seed_of_action_space():
 def test_highway_env_is_imported_without_pandas_and_pyplot_which_work_all_the_same():
     code = (
         "import sys, gymnasium as gym, shared_control_env\n"
-        "gym.make('SharedControl/TwoLane-v0').reset(seed=0)\n"
+        "gym.make('SharedControl/TwoLane-v1').reset(seed=0)\n"
         "print([name for name in ('pandas', 'matplotlib.pyplot') if name in sys.modules])\n"
         "import pandas.testing, matplotlib.pyplot as plt\n"
         "from highway_env.envs.common import observation\n"

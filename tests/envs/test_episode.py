@@ -69,7 +69,7 @@ def test_draws_take_the_same_numbers_whatever_the_degradation():
     assert len({rng.random() for rng in generators}) == 1
 
 
-@pytest.mark.parametrize("name", ["SharedControl/LaneKeeping-v0", "SharedControl/DenseTraffic-v0"])
+@pytest.mark.parametrize("name", ["SharedControl/LaneKeeping-v1", "SharedControl/DenseTraffic-v1"])
 def test_same_seed_same_episodes_and_another_seed_others(name):
     def first_two(seed):
         env = gym.make(name)
@@ -98,7 +98,7 @@ def test_ground_truth_is_in_info_and_the_label_not_in_the_observation():
     config = {"degradations": [], "randomise": []}
     fault = {"kind": "lane_offset", "onset": 0.0, "size": 1.5}
     healthy, misled = (
-        gym.make("SharedControl/LaneKeeping-v0", config={**config, "faults": faults}) for faults in ([], [fault])
+        gym.make("SharedControl/LaneKeeping-v1", config={**config, "faults": faults}) for faults in ([], [fault])
     )
     seen = [env.reset(seed=0)[0] for env in (healthy, misled)]
     np.testing.assert_array_equal(*seen)
@@ -118,7 +118,7 @@ def test_missed_lead_drives_at_its_own_speed():
 
 
 def test_lane_change_moves_the_reference_and_opens_both_lanes():
-    env = gym.make("SharedControl/LaneChange-v0", config={"degradations": [], "randomise": []}).unwrapped
+    env = gym.make("SharedControl/LaneChange-v1", config={"degradations": [], "randomise": []}).unwrapped
     env.reset(seed=0)
     regions, targets, changing = [], [], []
     for _ in range(140):

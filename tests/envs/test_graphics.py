@@ -26,7 +26,7 @@ def count(frame, colour):
     return int((frame == np.array(colour)).all(axis=-1).sum())
 
 
-@pytest.mark.parametrize("name", ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"])
+@pytest.mark.parametrize("name", ["SharedControl/TwoLane-v1", "SharedControl/Curve-v1"])
 def test_frame_shows_prediction_path_safe_area_and_gauges(name):
     frame = frame_after(name, 40)
     assert frame.dtype == np.uint8
@@ -43,18 +43,18 @@ def test_frame_shows_prediction_path_safe_area_and_gauges(name):
 
 def test_left_is_up():
     # The prediction under a steering fault to the left lies above the middle of the road's picture.
-    frame = frame_after("SharedControl/TwoLane-v0", 30)
+    frame = frame_after("SharedControl/TwoLane-v1", 30)
     world = frame[: frame.shape[0] - graphics.PANEL_HEIGHT]
     rows = np.flatnonzero((world == np.array(graphics.PREDICTION)).all(axis=-1).any(axis=1))
     assert rows.mean() < 0.5 * len(world) - 5
 
 
 def test_frames_repeat():
-    np.testing.assert_array_equal(frame_after("SharedControl/Curve-v0", 20), frame_after("SharedControl/Curve-v0", 20))
+    np.testing.assert_array_equal(frame_after("SharedControl/Curve-v1", 20), frame_after("SharedControl/Curve-v1", 20))
 
 
 def test_closing_one_viewer_leaves_the_other_alive():
-    first, second = (gym.make("SharedControl/TwoLane-v0", render_mode="rgb_array") for _ in range(2))
+    first, second = (gym.make("SharedControl/TwoLane-v1", render_mode="rgb_array") for _ in range(2))
     for env in (first, second):
         env.reset(seed=0)
         env.render()
@@ -67,7 +67,7 @@ def test_video_runs_at_the_speed_of_the_drive(tmp_path):
     import imageio_ffmpeg
 
     config = {"duration": 1.0, "screen_width": 320, "screen_height": 240}
-    env = gym.make("SharedControl/TwoLane-v0", render_mode="rgb_array", config=config)
+    env = gym.make("SharedControl/TwoLane-v1", render_mode="rgb_array", config=config)
     video = RecordVideo(DriverModel(env), str(tmp_path / "video"), episode_trigger=lambda _: True)
     video.reset(seed=0)
     for _ in range(20):
@@ -81,8 +81,8 @@ def test_video_runs_at_the_speed_of_the_drive(tmp_path):
 
 
 def test_metadata_is_each_environments_own():
-    slow = gym.make("SharedControl/TwoLane-v0", config={"simulation_frequency": 20, "policy_frequency": 10})
-    fast = gym.make("SharedControl/TwoLane-v0")
+    slow = gym.make("SharedControl/TwoLane-v1", config={"simulation_frequency": 20, "policy_frequency": 10})
+    fast = gym.make("SharedControl/TwoLane-v1")
     for env in (slow, fast):
         env.reset(seed=0)
     assert (slow.metadata["render_fps"], fast.metadata["render_fps"]) == (10, 20)
@@ -91,7 +91,7 @@ def test_metadata_is_each_environments_own():
 def test_human_mode_on_a_dummy_display():
     code = (
         "import gymnasium as gym, numpy as np, shared_control_env\n"
-        "env = gym.make('SharedControl/TwoLane-v0', render_mode='human', config={'screen_width': 400})\n"
+        "env = gym.make('SharedControl/TwoLane-v1', render_mode='human', config={'screen_width': 400})\n"
         "env.reset(seed=0)\n"
         "env.step(np.zeros(2, dtype=np.float32))\n"
         "import pygame\n"
@@ -106,7 +106,7 @@ def test_human_mode_on_a_dummy_display():
 
 def test_the_gauges_are_those_of_the_step_that_led_to_the_picture(monkeypatch):
     config = {"degradations": ["delay"], "authority": {"law": "none"}}
-    env = DriverModel(gym.make("SharedControl/Bend-v0", render_mode="rgb_array", config=config))
+    env = DriverModel(gym.make("SharedControl/Bend-v1", render_mode="rgb_array", config=config))
     env.reset(seed=1_000_000)
     for _ in range(125):
         info = env.step(0)[4]

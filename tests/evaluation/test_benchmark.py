@@ -218,9 +218,9 @@ def test_the_command_killed_at_any_moment_goes_on(tmp_path):
     output, _ = again.communicate(timeout=300)
     assert again.returncode == 0, output
     table = pd.read_parquet(tmp_path / "run/episodes.parquet")
-    assert len(table) == 8 * 17 * 2 * 4
+    assert len(table) == 10 * 17 * 2 * 4
     assert not table.duplicated(IDENTITY).any()
-    assert "1088 episodes are in" in output
+    assert "1360 episodes are in" in output
 
 
 def test_the_command_names_what_is_wrong(tmp_path):
@@ -238,7 +238,7 @@ def test_the_command_names_what_is_wrong(tmp_path):
 
 def test_list_and_replay(tmp_path):
     listed, _ = command("list").communicate(timeout=60)
-    for name in (*DRIVERS, *AUTHORITIES, *SUITES, "lateral_rms", "loss_of_effectiveness", "SharedControl/CutIn-v0"):
+    for name in (*DRIVERS, *AUTHORITIES, *SUITES, "lateral_rms", "loss_of_effectiveness", "SharedControl/CutIn-v1"):
         assert name in listed
     video = tmp_path / "episode.mp4"
     arguments = ("replay", "--scenario", "bend", "--degradation", "stuck", "--driver", "scripted", "--seed", 2)
@@ -305,7 +305,7 @@ def test_the_driver_who_knows_the_own_lag_does_not_fail():
     """The predictive driver of the paper alone leaves the road in half of the episodes; knowing its lag, it stays."""
     laws = ["driver_only", "none", "proportional", "paper"]
     table = evaluate("internal_model", laws, "full", seeds=[1])
-    assert len(table) == 4 * 136
+    assert len(table) == 4 * 170
     assert table["terminated"].mean() <= 0.005
     assert not table.loc[table["degradation"] == "none", "terminated"].any()
     alone = evaluate(["mpc", "internal_model"], "driver_only", "full", seeds=[1]).groupby("driver")

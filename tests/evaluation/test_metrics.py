@@ -17,6 +17,7 @@ def trajectory(**changes):
         "lane_width": 4.0,
         "speed": np.full(T, 10.0),
         "target_speed": np.full(T, 10.0),
+        "lateral_speed": np.zeros(T),
         "yaw_rate": np.zeros(T),
         "command": np.zeros((T, 2)),
         "delta_max": 0.5,
@@ -101,8 +102,8 @@ LATERAL = steps((10, 0.0), (20, 2.5), (10, 1.0), (5, -3.0), (55, 0.0))
         ("conflict", {"driver": np.full((T, 2), 0.5), "automation": np.full((T, 2), [-0.2, 0.2])}, 0.1),
         ("lateral_acceleration_max", {"yaw_rate": steps((50, 0.1), (50, -0.3))}, 3.0),
         ("lateral_jerk_max", {"yaw_rate": steps((50, 0.0), (50, 0.2))}, 4.0),
-        ("iso_11270_violation", {"yaw_rate": steps((90, 0.0), (10, 0.31))}, 0.1),
-        ("iso_11270_violation", {"yaw_rate": steps((80, 0.0), (20, 0.26))}, 0.1),
+        ("iso_11270_violation", {"yaw_rate": steps((90, 0.0), (10, 0.31))}, 9 / 99),
+        ("iso_11270_violation", {"yaw_rate": steps((80, 0.0), (20, 0.26))}, 9 / 99),
         ("jerk_rms", {"command": np.stack([steps((50, 0.0), (50, 0.1)), np.zeros(T)], 1)}, np.sqrt(100.0 / 99.0)),
         ("speed_rms", {"speed": steps((50, 12.0), (50, 8.0))}, 2.0),
         ("recovery_time", {"degraded": FAULT, "lateral_error": steps((30, 0.0), (10, 1.0), (60, 0.2))}, 20 * 0.05),
@@ -134,7 +135,12 @@ def test_steering_reversals_of_a_sine(amplitude, reversals):
 @pytest.mark.parametrize("name", METRICS)
 def test_left_and_right_are_the_same(name):
     rng = np.random.default_rng(0)
-    signals = {"lateral_error": rng.normal(size=T), "yaw_rate": 0.1 * rng.normal(size=T), "degraded": FAULT}
+    signals = {
+        "lateral_error": rng.normal(size=T),
+        "lateral_speed": rng.normal(size=T),
+        "yaw_rate": 0.1 * rng.normal(size=T),
+        "degraded": FAULT,
+    }
     signals |= {key: 0.1 * rng.normal(size=(T, 2)) for key in ("command", "driver", "automation")}
     mirrored = {key: value if key == "degraded" else -value for key, value in signals.items()}
     for key in ("command", "driver", "automation"):
@@ -144,6 +150,8 @@ def test_left_and_right_are_the_same(name):
 
 
 def test_short_episodes_have_no_windowed_jerk():
-    short = trajectory(**{key: getattr(trajectory(), key)[:5] for key in ("lateral_error", "speed", "yaw_rate")})
+    short = trajectory(
+        **{key: getattr(trajectory(), key)[:5] for key in ("lateral_error", "speed", "lateral_speed", "yaw_rate")}
+    )
     assert np.isnan(METRICS["lateral_jerk_max"].measure(short))
     assert METRICS["iso_11270_violation"].measure(short) == 0.0

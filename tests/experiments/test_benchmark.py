@@ -5,6 +5,8 @@ import pandas as pd
 import pytest
 
 from experiments import benchmark, sensitivity
+from shared_control_env.envs.scenarios import SCENARIOS
+from shared_control_env.envs.settings import combined
 from shared_control_env.evaluation import evaluate
 
 
@@ -68,3 +70,24 @@ def test_breakpoints_as_published_are_the_limiters():
     base = evaluate("mpc", "proportional", "paper")
     same = sensitivity.measure(sensitivity.variations()[0])
     np.testing.assert_allclose(same[same["authority"] == "proportional"]["lateral_max"], base["lateral_max"])
+
+
+def test_every_variation_is_allowed_and_the_persons_and_tyres_are_among_them():
+    both = [*sensitivity.variations(), *sensitivity.variations_of_the_person()]
+    for variation in both:
+        combined(SCENARIOS["two_lane"].settings, variation.config)
+    names = {variation.parameter for variation in both}
+    assert names >= {"brush tyres, friction", "steering actuator, lag [s]", "response, factor", "delay, factor"}
+
+
+def test_sensitivity_of_a_person(monkeypatch):
+    monkeypatch.setattr(sensitivity, "PEOPLE", range(6))
+    chosen = [
+        each
+        for each in sensitivity.variations_of_the_person()
+        if each.parameter in (sensitivity.BASE, "response, factor")
+    ]
+    table = pd.concat([sensitivity.measure(variation) for variation in chosen], ignore_index=True)
+    assert set(table["driver"]) == {"hands_on"}
+    _, ranges = sensitivity.deviations(table, "two_lane", "proportional")
+    assert ranges["high"]["response, factor"] > ranges["low"]["response, factor"] + 0.2

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments import claims, key_figures
+from experiments import claims, key_figures, style
 from experiments.case_runs import Run, all_runs, simulate
 from shared_control_env.envs import CurveEnv, TwoLaneEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
@@ -119,3 +119,11 @@ def test_tables_are_whole(runs):
         assert isinstance(table, pd.DataFrame)
         assert (table["automation_failures"] == 0).all()
         assert (table["driver_failures"] == 0).all()
+
+
+def test_curves_that_lie_on_one_another_are_said_to():
+    t = np.linspace(0.0, 1.0, 50)
+    curves = {"a": t, "b": t + 0.001, "c": t**2, "short": np.where(t < 0.5, t**2, np.nan), "d": 1.0 - t}
+    expected = {"a": "a", "b": "b (on a)", "c": "c", "short": "short (on c)", "d": "d"}
+    assert style.labels(curves, 0.01) == expected
+    assert style.labels(curves, 1e-4)["b"] == "b"

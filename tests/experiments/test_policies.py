@@ -25,7 +25,7 @@ def test_a_small_run_is_published(tmp_path, monkeypatch):
     for name, value in (
         ("FOLDER", tmp_path / "trainings"),
         ("POLICIES", tmp_path / "shipped"),
-        ("IDS", ["SharedControl/Bend-v0", "SharedControl/Bend-v0"]),
+        ("IDS", ["SharedControl/Bend-v1", "SharedControl/Bend-v1"]),
         ("SCENARIOS", ("bend",)),
         ("SEEDS", range(2)),
     ):

@@ -142,7 +142,7 @@ import pickle, sys
 import numpy as np, gymnasium as gym, shared_control_env
 traces = []
 for name in ("TwoLane", "LaneChange", "DenseTraffic"):
-    env = gym.make(f"SharedControl/{name}-v0", config={"authority": {"law": "proportional"}})
+    env = gym.make(f"SharedControl/{name}-v1", config={"authority": {"law": "proportional"}})
     rng = np.random.default_rng(0)
     traces += [env.reset(seed=2)[1], *(env.step(rng.uniform(-0.3, 0.3, 2))[4] for _ in range(40))]
 pickle.dump(traces, open(sys.argv[1], "wb"))
@@ -166,7 +166,7 @@ def test_the_core_as_python_gives_what_the_compiled_one_gives(tmp_path):
 
 
 def test_the_kernel_as_python_is_refused():
-    code = "import gymnasium as gym, shared_control_env; gym.make_vec('SharedControl/TwoLane-v0', num_envs=2)"
+    code = "import gymnasium as gym, shared_control_env; gym.make_vec('SharedControl/TwoLane-v1', num_envs=2)"
     result = subprocess.run(
         [sys.executable, "-c", code],
         capture_output=True,

@@ -86,6 +86,7 @@ BESIDE = {
     "person.response": RESTING,
     "person.response_spread": RESTING,
     "vehicle.mu": {"vehicle": {"tyre": extras.TYRE}},
+    "model.mu": {"vehicle": {"tyre": extras.TYRE}},
     "internal_model.K_h": {"internal_model": {"active": True}},
     "internal_model.T_h": {"internal_model": {"active": True}},
 }
@@ -120,6 +121,13 @@ VALUES = {
     "model.l_r": 1.2,
     "model.C_f": 50_000.0,
     "model.C_r": 90_000.0,
+    "model.mu": 0.1,
+    "model.tyre": extras.TYRE,
+    "actuator.acceleration_lag": 0.3,
+    "actuator.steering_lag": 0.3,
+    "actuator.acceleration_rate": 1.0,
+    "actuator.steering_rate": 0.05,
+    "persons": ["attentive"],
     "observation.type": extras.OBSERVATION,
     "reward_terms": [{"term": extras.TERM, "weight": 1.0}],
     "person.lane_position": 0.2,
@@ -175,7 +183,7 @@ def other(value):
 
 def observed(config):
     """All that a seeded episode shows: length, observations, rewards, infos, two pictures."""
-    env = DriverModel(gym.make("SharedControl/TwoLane-v0", render_mode="rgb_array", config=config))
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1", render_mode="rgb_array", config=config))
     trace = [env.reset(seed=1), env.render()]
     done = False
     while not done:
@@ -233,12 +241,12 @@ def test_it_can_be_drawn_or_is_refused(path):
     config = configuration.merge(config, BESIDE.get(path, {}))
     present = configuration.changes.at(config, tuple(path.split(".")))
     if not is_number(VALUES.get(path, present)):
-        with pytest.raises(ValueError, match=r"no number|must have"):
+        with pytest.raises(ValueError, match=r"no number|must have|valid string"):
             configuration.check({**config, "randomise": [{"setting": path, "low": 0.0, "high": 1.0}]})
         return
     value = VALUES[path] if path in VALUES else other(present)
     config["randomise"] = [{"setting": path, "choices": [value]}]
-    env, error = tried(lambda: gym.make("SharedControl/TwoLane-v0", config=config))
+    env, error = tried(lambda: gym.make("SharedControl/TwoLane-v1", config=config))
     if error is None:
         _, error = tried(lambda: env.reset(seed=0))
     if error is not None:
@@ -255,7 +263,7 @@ def is_number(value):
 @pytest.mark.parametrize("path", LEAVES)
 def test_assigned_to_the_config_it_counts_from_the_next_reset_on(path):
     busy = {**BUSY, **BESIDE.get(path, {})}
-    env = gym.make("SharedControl/TwoLane-v0", config=busy).unwrapped
+    env = gym.make("SharedControl/TwoLane-v1", config=busy).unwrapped
     config = configuration.merge(configuration.plain(Settings()), BUSY)
     value = VALUES[path] if path in VALUES else other_value(path, config)
     *sections, last = path.split(".")
@@ -272,7 +280,7 @@ def test_assigned_to_the_config_it_counts_from_the_next_reset_on(path):
 
 
 def test_configure_in_the_middle_of_an_episode_waits_for_the_next():
-    steady, changed = (gym.make("SharedControl/TwoLane-v0") for _ in range(2))
+    steady, changed = (gym.make("SharedControl/TwoLane-v1") for _ in range(2))
     for env in (steady, changed):
         env.reset(seed=0)
     changed.unwrapped.configure({"simulation_frequency": 100, "duration": 1.0, "authority": {"law": "none"}})
@@ -284,10 +292,10 @@ def test_configure_in_the_middle_of_an_episode_waits_for_the_next():
 
 
 EVERY = [
-    "SharedControl/LaneKeeping-v0",
-    "SharedControl/LaneChange-v0",
-    "SharedControl/Bend-v0",
-    "SharedControl/CutIn-v0",
+    "SharedControl/LaneKeeping-v1",
+    "SharedControl/LaneChange-v1",
+    "SharedControl/Bend-v1",
+    "SharedControl/CutIn-v1",
 ]
 
 
@@ -306,20 +314,20 @@ def test_what_is_set_by_name_is_not_drawn(name, make):
 def test_a_setting_both_set_and_drawn_is_refused_by_name():
     draws = [{"setting": "ego.speed", "low": 10.0, "high": 12.0}]
     with pytest.raises(ValueError, match=r"'randomise'\]\[0\] draws 'ego.speed', which is set to 20.0 too"):
-        gym.make("SharedControl/TwoLane-v0", config={"ego": {"speed": 20.0}, "randomise": draws})
+        gym.make("SharedControl/TwoLane-v1", config={"ego": {"speed": 20.0}, "randomise": draws})
 
 
 def test_a_whole_section_set_by_name_is_not_drawn():
-    env = gym.make("SharedControl/LaneKeeping-v0", config={"vehicles": []})
+    env = gym.make("SharedControl/LaneKeeping-v1", config={"vehicles": []})
     env.reset(seed=0)
     assert not any(entry["setting"].startswith("vehicles") for entry in env.unwrapped.config["randomise"])
-    env = gym.make("SharedControl/LaneChange-v0", config={"lane_change": None})
+    env = gym.make("SharedControl/LaneChange-v1", config={"lane_change": None})
     env.reset(seed=0)
     assert env.unwrapped.episode.lane_change is None
 
 
 def test_a_whole_config_that_was_edited_acts_or_is_refused():
-    name = "SharedControl/CutIn-v0"
+    name = "SharedControl/CutIn-v1"
     config = copy.deepcopy(gym.make(name).unwrapped.config)
     again = gym.make(name, config=config)
     np.testing.assert_array_equal(again.reset(seed=4)[0], gym.make(name).reset(seed=4)[0])
@@ -331,7 +339,7 @@ def test_a_whole_config_that_was_edited_acts_or_is_refused():
 
 
 def test_a_setting_cannot_be_taken_away():
-    env = gym.make("SharedControl/Bend-v0").unwrapped
+    env = gym.make("SharedControl/Bend-v1").unwrapped
     del env.config["randomise"]
     with pytest.raises(ValueError, match="config lacks 'randomise'"):
         env.reset(seed=0)
@@ -352,18 +360,18 @@ DRAWS = {
 @pytest.mark.parametrize(("entry", "message"), DRAWS.values(), ids=list(DRAWS))
 def test_what_cannot_be_drawn_is_refused(entry, message):
     with pytest.raises(ValueError, match=message):
-        gym.make("SharedControl/TwoLane-v0", config={"randomise": [entry]})
+        gym.make("SharedControl/TwoLane-v1", config={"randomise": [entry]})
 
 
 def test_a_setting_is_drawn_once_and_one_left_at_its_default_too():
     twice = [{"setting": "ego.speed", "low": 9.0, "high": 10.0}] * 2
     with pytest.raises(ValueError, match="as entry 0 does"):
-        gym.make("SharedControl/TwoLane-v0", config={"randomise": twice})
+        gym.make("SharedControl/TwoLane-v1", config={"randomise": twice})
     fault = {
         "faults": [{"onset": 0.5, "size": 0.1}],
         "randomise": [{"setting": "faults.0.ramp", "low": 0.5, "high": 1.0}],
     }
-    env = gym.make("SharedControl/TwoLane-v0", config=fault)
+    env = gym.make("SharedControl/TwoLane-v1", config=fault)
     env.reset(seed=0)
     assert 0.5 <= env.unwrapped.episode.faults[0].ramp <= 1.0
 
@@ -372,12 +380,12 @@ def test_a_setting_is_drawn_once_and_one_left_at_its_default_too():
 def test_what_is_no_config_is_refused(config):
     for make in (gym.make, lambda name, config: gym.make_vec(name, num_envs=1, config=config)):
         with pytest.raises(ValueError, match="must be a dict"):
-            make("SharedControl/TwoLane-v0", config=config)
+            make("SharedControl/TwoLane-v1", config=config)
 
 
 @pytest.mark.parametrize("key", ["duration", "randomise"])
 def test_the_kernels_config_says_that_it_is_read_only(key):
-    env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=1)
+    env = gym.make_vec("SharedControl/TwoLane-v1", num_envs=1)
     with pytest.raises(TypeError, match="read only"):
         env.unwrapped.config[key] = 1.0
     with pytest.raises(TypeError, match="read only"):
@@ -391,8 +399,8 @@ def test_the_kernels_config_says_that_it_is_read_only(key):
 def test_the_kernel_refuses_to_draw_what_all_share():
     draws = [{"setting": "duration", "low": 1.0, "high": 2.0}]
     with pytest.raises(ValueError, match=r"'duration' is shared by all"):
-        gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, config={"randomise": draws})
-    env = gym.make("SharedControl/TwoLane-v0", config={"randomise": draws, "faults": []})
+        gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, config={"randomise": draws})
+    env = gym.make("SharedControl/TwoLane-v1", config={"randomise": draws, "faults": []})
     env.reset(seed=0)
     steps = 0
     truncated = False
@@ -405,7 +413,7 @@ def test_the_kernel_refuses_to_draw_what_all_share():
 
 def test_whole_numbers_are_drawn_with_both_ends():
     draws = [{"setting": "automation.H_p", "low": 5, "high": 7}]
-    env = gym.make("SharedControl/TwoLane-v0", config={"randomise": draws})
+    env = gym.make("SharedControl/TwoLane-v1", config={"randomise": draws})
     seen = set()
     for seed in range(40):
         env.reset(seed=seed)
@@ -440,4 +448,4 @@ SHARED = {
 @pytest.mark.parametrize(("config", "message"), SHARED.values(), ids=list(SHARED))
 def test_what_would_not_act_is_refused(config, message):
     with pytest.raises(ValueError, match=message):
-        gym.make("SharedControl/TwoLane-v0", config=config)
+        gym.make("SharedControl/TwoLane-v1", config=config)

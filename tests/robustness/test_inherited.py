@@ -24,7 +24,7 @@ from shared_control_env.envs import SharedControlEnv, TwoLaneEnv
 from shared_control_env.registration import ENVIRONMENTS
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel
 
-TWO_LANE = "SharedControl/TwoLane-v0"
+TWO_LANE = "SharedControl/TwoLane-v1"
 NOTHING = {"driver": np.zeros(2), "authority": np.ones(1)}
 
 # Public members of highway-env's base, and what becomes of each: arguments with which it acts, or words that refuse it.
@@ -311,7 +311,7 @@ def test_a_long_drive_of_the_predictive_driver_is_copied_too(monkeypatch):
 
 WINDOWS = """
 import numpy as np, pygame, gymnasium as gym, shared_control_env
-first, second = (gym.make("SharedControl/TwoLane-v0", render_mode="human") for _ in range(2))
+first, second = (gym.make("SharedControl/TwoLane-v1", render_mode="human") for _ in range(2))
 for env in (first, second):
     env.reset(seed=0)
     env.step(np.zeros(2))
@@ -320,7 +320,7 @@ assert pygame.display.get_init()
 second.step(np.zeros(2))
 second.close()
 assert not pygame.display.get_init()
-hidden = gym.make("SharedControl/TwoLane-v0", render_mode="human", config={"offscreen_rendering": True})
+hidden = gym.make("SharedControl/TwoLane-v1", render_mode="human", config={"offscreen_rendering": True})
 hidden.reset(seed=0)
 hidden.step(np.zeros(2))
 assert not pygame.display.get_init()
@@ -381,7 +381,7 @@ def test_settings_of_other_types_are_taken(kind):
 
 @pytest.mark.parametrize("seed", [np.int64(3), np.array(3), np.uint8(3)])
 def test_seeds_of_other_types(seed):
-    env, many = gym.make(TWO_LANE), gym.make_vec("SharedControl/Bend-v0", num_envs=2)
+    env, many = gym.make(TWO_LANE), gym.make_vec("SharedControl/Bend-v1", num_envs=2)
     np.testing.assert_array_equal(env.reset(seed=seed)[0], env.reset(seed=3)[0])
     np.testing.assert_array_equal(many.reset(seed=seed)[0], many.reset(seed=3)[0])
     np.testing.assert_array_equal(many.reset(seed=np.array([3, 4]))[0], many.reset(seed=(3, 4))[0])

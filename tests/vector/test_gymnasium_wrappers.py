@@ -11,7 +11,7 @@ pytest.importorskip("array_api_compat", reason="Gymnasium's wrappers of vectoris
 
 from gymnasium.wrappers import vector as wrappers
 
-ID, CONFIG = "SharedControl/LaneChange-v0", {"duration": 0.5}
+ID, CONFIG = "SharedControl/LaneChange-v1", {"duration": 0.5}
 
 
 def both(mode=AutoresetMode.NEXT_STEP):

@@ -19,8 +19,8 @@ from shared_control_env.core import kernel
 from shared_control_env.vector import environment
 from tests.vector.agreement import flat
 
-TWO_LANE = "SharedControl/TwoLane-v0"
-LANE_CHANGE = "SharedControl/LaneChange-v0"
+TWO_LANE = "SharedControl/TwoLane-v1"
+LANE_CHANGE = "SharedControl/LaneChange-v1"
 
 
 def driven(name, steps=5, **options):
@@ -99,7 +99,7 @@ def test_a_closed_environment_says_so(threads):
 def test_goes_on_in_a_forked_process():
     code = (
         "import os, numpy as np, gymnasium as gym, shared_control_env\n"
-        "env = gym.make_vec('SharedControl/TwoLane-v0', num_envs=4, threads=2)\n"
+        "env = gym.make_vec('SharedControl/TwoLane-v1', num_envs=4, threads=2)\n"
         "env.reset(seed=0); env.step(np.zeros((4, 2)))\n"
         "read, write = os.pipe()\n"
         "child = os.fork()\n"

@@ -10,8 +10,8 @@ from shared_control_env.envs.starts import write_start
 from shared_control_env.vector import environment
 from tests.vector.agreement import assert_same_info, at, compare, gentle_driver
 
-TWO_LANE = "SharedControl/TwoLane-v0"
-LANE_CHANGE = "SharedControl/LaneChange-v0"
+TWO_LANE = "SharedControl/TwoLane-v1"
+LANE_CHANGE = "SharedControl/LaneChange-v1"
 SPEEDS = {"randomise": [{"setting": "ego.speed", "low": 8.0, "high": 16.0}]}
 IMPOSSIBLE = {"randomise": [{"setting": "ego.lateral_offset", "choices": [0.1, 9.0]}], "faults": []}
 

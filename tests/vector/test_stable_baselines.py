@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormali
 import shared_control_env  # noqa: F401
 from shared_control_env.vector.stable_baselines import StableBaselinesVecEnv
 
-TWO_LANE = "SharedControl/TwoLane-v0"
+TWO_LANE = "SharedControl/TwoLane-v1"
 CONFIG = {"duration": 1.0}
 
 

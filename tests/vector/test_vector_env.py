@@ -21,8 +21,8 @@ from shared_control_env.vector.environment import SharedControlVectorEnv
 from shared_control_env.wrappers import DriverModel
 from tests.vector.agreement import assert_same_info, at, compare, flat, gentle_driver, random_driver
 
-IDS = ["SharedControl/TwoLane-v0", "SharedControl/Curve-v0"]
-TWO_LANE = "SharedControl/TwoLane-v0"
+IDS = ["SharedControl/TwoLane-v1", "SharedControl/Curve-v1"]
+TWO_LANE = "SharedControl/TwoLane-v1"
 BIAS = {"onset": 0.2, "ramp": 0.4}
 NINE = [{"lane": 1, "position": 9.0 * i, "speed": 9.0} for i in range(9)]
 FAULTS = {
@@ -52,7 +52,7 @@ def test_same_in_every_scenario_under_every_degradation(name, degradation):
 
 
 @pytest.mark.parametrize("law", ["proportional", "driver_only"])
-@pytest.mark.parametrize("name", ["SharedControl/LeadBraking-v0", "SharedControl/CutIn-v0"])
+@pytest.mark.parametrize("name", ["SharedControl/LeadBraking-v1", "SharedControl/CutIn-v1"])
 def test_same_close_behind_others_and_in_collisions(name, law):
     # Beside a vehicle just ahead the free region is a rectangle, whose triangulation is not unique.
     config = {"authority": {"law": law}, "simulation_frequency": 60}
@@ -78,7 +78,7 @@ def test_same_in_episodes_that_begin_anew_under_a_degradation(kind):
 
 
 @pytest.mark.parametrize("mode", ["next_step", "same_step"])
-@pytest.mark.parametrize("name", ["SharedControl/LaneChange-v0", "SharedControl/Bend-v0"])
+@pytest.mark.parametrize("name", ["SharedControl/LaneChange-v1", "SharedControl/Bend-v1"])
 def test_same_episodes_are_drawn_one_after_the_other(name, mode):
     config = {"duration": 0.5}
     single, many = gym.make(name, config=config), gym.make_vec(name, num_envs=3, config=config, autoreset_mode=mode)
@@ -109,7 +109,7 @@ def test_same_episodes_are_drawn_one_after_the_other(name, mode):
 
 def test_a_rollout_of_a_drawn_scenario_draws_every_episode():
     config = {"duration": 0.5}
-    many = [gym.make_vec("SharedControl/CutIn-v0", num_envs=3, driver=True, config=config) for _ in range(2)]
+    many = [gym.make_vec("SharedControl/CutIn-v1", num_envs=3, driver=True, config=config) for _ in range(2)]
     for env in many:
         env.reset(seed=0)
     rewards = np.array([many[0].step(None)[1] for _ in range(25)])
@@ -118,7 +118,7 @@ def test_a_rollout_of_a_drawn_scenario_draws_every_episode():
 
 
 def test_environments_of_a_drawn_scenario_differ_and_repeat_with_their_seeds():
-    env = gym.make_vec("SharedControl/LaneKeeping-v0", num_envs=4)
+    env = gym.make_vec("SharedControl/LaneKeeping-v1", num_envs=4)
     first = env.reset(seed=[1, 2, 1, None])[0]
     assert (first[0] == first[2]).all()
     assert (first[0] != first[1]).any()
@@ -127,7 +127,7 @@ def test_environments_of_a_drawn_scenario_differ_and_repeat_with_their_seeds():
 
 
 def test_a_drawn_episode_is_shown_as_it_is():
-    env = gym.make_vec("SharedControl/Bend-v0", num_envs=2, render_mode="rgb_array", config={"duration": 0.2})
+    env = gym.make_vec("SharedControl/Bend-v1", num_envs=2, render_mode="rgb_array", config={"duration": 0.2})
     env.reset(seed=0)
     first = env.render()[0]
     for _ in range(6):
@@ -181,7 +181,7 @@ def test_same_for_an_allocator():
 
 
 @pytest.mark.parametrize("config", [{}, {"internal_model": {"active": True}, "authority": {"law": "proportional"}}])
-@pytest.mark.parametrize("name", [*IDS, "SharedControl/Bend-v0"])
+@pytest.mark.parametrize("name", [*IDS, "SharedControl/Bend-v1"])
 def test_driver_in_the_kernel_is_the_predictive_driver(name, config):
     single = DriverModel(gym.make(name, config=config))
     many = gym.make_vec(name, num_envs=2, driver=True, config=config)
@@ -394,7 +394,7 @@ def test_stepping_before_a_reset():
 def test_starts_without_highway_env():
     code = (
         "import sys, gymnasium as gym, shared_control_env\n"
-        "gym.make_vec('SharedControl/TwoLane-v0', num_envs=2).reset(seed=0)\n"
+        "gym.make_vec('SharedControl/TwoLane-v1', num_envs=2).reset(seed=0)\n"
         "print([name for name in ('highway_env', 'pygame', 'pandas') if name in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -51,7 +51,7 @@ def test_order_of_the_wrappers_does_not_matter():
 
 
 def test_limiter_is_the_fuzzy_inference_of_the_assessed_risk():
-    env = DriverModel(gym.make("SharedControl/TwoLane-v0"))
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1"))
     env.reset(seed=0)
     values = []
     for _ in range(60):
@@ -72,7 +72,7 @@ def test_allocators_action_is_alpha():
 
 def test_any_driver_plugs_in():
     driver = Steady()
-    env = DriverModel(gym.make("SharedControl/TwoLane-v0"), driver)
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1"), driver)
     observation, _ = env.reset(seed=0)
     _, _, _, _, info = env.step(0)
     np.testing.assert_allclose(info["u_h_des"], driver.command)
@@ -84,7 +84,7 @@ def test_drivers_seed_comes_from_the_environments_generator():
     seeds = []
     for seed in (1, 1, 2):
         driver = Steady()
-        DriverModel(gym.make("SharedControl/TwoLane-v0"), driver).reset(seed=seed)
+        DriverModel(gym.make("SharedControl/TwoLane-v1"), driver).reset(seed=seed)
         seeds.append(driver.seeds[-1])
     assert seeds[0] == seeds[1] != seeds[2]
 
@@ -107,7 +107,7 @@ def test_refused(build, message):
 
 @pytest.mark.parametrize("command", [(np.nan, 0.0), (0.0, 0.0, 0.0)])
 def test_a_drivers_malformed_command_moves_nothing(command):
-    env = DriverModel(gym.make("SharedControl/TwoLane-v0"), Steady(command))
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1"), Steady(command))
     env.reset(seed=0)
     state = env.unwrapped.vehicle.array.copy()
     with pytest.raises(ValueError, match=r"driver: act\(\) gave"):
@@ -116,15 +116,15 @@ def test_a_drivers_malformed_command_moves_nothing(command):
 
 
 def test_the_limiter_can_be_left_out():
-    env = gym.make("SharedControl/TwoLane-v0", limiter=False)
+    env = gym.make("SharedControl/TwoLane-v1", limiter=False)
     assert open_slots(env) == ("driver", "authority")
     limited = AuthorityLimiter(env)
-    plain = gym.make("SharedControl/TwoLane-v0")
+    plain = gym.make("SharedControl/TwoLane-v1")
     np.testing.assert_array_equal(limited.reset(seed=0)[0], plain.reset(seed=0)[0])
     np.testing.assert_array_equal(limited.step(np.zeros(2))[0], plain.step(np.zeros(2))[0])
     assert open_slots(gym.make(env.spec)) == ("driver", "authority")
     with pytest.raises(ValueError, match="allocator = 'fuzzy' must be an object"):
-        gym.make("SharedControl/TwoLane-v0", limiter="fuzzy")
+        gym.make("SharedControl/TwoLane-v1", limiter="fuzzy")
 
 
 def test_another_automation_is_made_with_the_environment():
@@ -135,11 +135,11 @@ def test_another_automation_is_made_with_the_environment():
         def act(self, scene):
             return Solution(np.array([-2.0, 0.0]), True, 0, 0, 0.0, 0.0, 0.0)
 
-    env = gym.make("SharedControl/TwoLane-v0", automation=Braking(), config={"faults": []})
+    env = gym.make("SharedControl/TwoLane-v1", automation=Braking(), config={"faults": []})
     for _ in range(2):
         env.reset(seed=0)
         np.testing.assert_array_equal(env.step(np.zeros(2))[4]["u_a_des"], [-2.0, 0.0])
     with pytest.raises(ValueError, match=r"reset\(\) and act\(scene\)"):
-        gym.make("SharedControl/TwoLane-v0", automation=Braking)
+        gym.make("SharedControl/TwoLane-v1", automation=Braking)
     with pytest.raises(ValueError, match="automation: another one is not in the kernel"):
-        gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, automation=Braking())
+        gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, automation=Braking())

@@ -1,14 +1,19 @@
 """The driver's predictive controller (Eq. 14, 15) as a quadratic program.
 
 The cost is that of the automation without the potential field. The model is linearised about the current state and the
-last command, so that the program is quadratic. Its variables are the H_c commands, divided by their limits, and one
-slack eps >= 0. The slack has an exact (linear) penalty and softens the rows of the safe area C. The program is thus
-always feasible, and eps is 0 where the rows can be satisfied at a lower cost than that of the penalty.
+last command, so that the program is quadratic. Its variables are the H_c commands, divided by their limits, and two
+slacks: eps >= 0 softens the rows of C's sides, eta >= 0 that of its end. Both have an exact (linear) penalty. The
+program is thus always feasible, and a slack is 0 where its rows can be satisfied at a lower cost than that of the
+penalty. Two slacks, since a car that cannot stop before the end of C must still keep to its sides.
 
 ::
 
-    min  x^T P x / 2 + q^T x      subject to   low <= A x <= high,    x = [U / bound, eps]
-    rows:  y(i) - eps <= upper(i),   y(i) + eps >= lower(i),   -1 <= U / bound <= 1,   eps >= 0
+    min  x^T P x / 2 + q^T x      subject to   low <= A x <= high,    x = [U / bound, eps, eta]
+    rows:  y(i) - eps <= upper(i),   y(i) + eps >= lower(i),   s(H_p) - eta <= end,
+           -1 <= U / bound <= 1,   eps >= 0,   eta >= 0
+
+Eq. 15 keeps the predicted (x, y) in C. C ends at the clearance d_o behind the preceding vehicle, which the row of s
+keeps. That row is for the last stage alone, since s(i) does not decrease.
 
 The paper's driver assumes that its desired command drives the car. It knows neither its own lag nor the automation's
 command. The internal model adds both to the program; the variables are still u_h,des::
@@ -18,9 +23,7 @@ command. The internal model adds both to the program; the variables are still u_
     z(i+1)       = A z(i) + B u(i) + affine
 
 with K_h and T_h as the driver assumes them. The effort then has two parts: the command that drives the car, at H_c
-stages from the first stage on that the driver can still influence; and u_h,des with a small weight. One more row keeps
-s(H_p) - eps in C, which ends at the clearance behind the preceding vehicle. The paper's program constrains only the
-lateral position to C.
+stages from the first stage on that the driver can still influence; and u_h,des with a small weight.
 """
 
 from __future__ import annotations
@@ -46,7 +49,7 @@ from shared_control_env.core.risk.safe_area import lateral_bounds
 from shared_control_env.core.world.vehicle import PSI, V_X, V_Y, R, S, Y, implicit_step_jacobian
 
 SLACK_LINEAR = 200.0
-"""Linear penalty of the slack [1/m]. The penalty is exact where the sum of the rows' multipliers is smaller.
+"""Linear penalty of a slack [1/m]. The penalty is exact where the sum of the rows' multipliers is smaller.
 
 In 50 000 random scenes this sum was at most 61 within 1.9 m of the centre of the lane. Beyond the edge of the lane the
 sum grows without bound, since large steering is needed to change the first row; there the slack becomes some
@@ -54,7 +57,10 @@ centimetres instead. With a penalty of 2000, OSQP sometimes misses its tolerance
 """
 
 SLACK_QUADRATIC = 1.0
-"""Quadratic penalty of the slack [1/m^2], which makes the program strictly convex."""
+"""Quadratic penalty of a slack [1/m^2], which makes the program strictly convex."""
+
+SLACKS = 2
+"""Number of slacks [-]: one for the sides of C, one for its end."""
 
 
 SHARE_OF_DESIRED = 0.01
@@ -65,13 +71,22 @@ SHARE_OF_DESIRED = 0.01
 def count_rows(p: Parameters) -> int:
     """Number of rows of the program.
 
-    There is one row for each side of C at every stage, one for the end of C with the internal model, and one for each
-    variable.
+    There is one row for each side of C at every stage, one for the end of C, and one for each variable.
 
     Args:
         p: parameters.
     """
-    return 2 * p.driver.H_p + (1 if p.internal_model.active else 0) + 2 * p.driver.H_c + 1
+    return 2 * p.driver.H_p + 1 + count_variables(p)
+
+
+@jit
+def count_variables(p: Parameters) -> int:
+    """Number of variables of the program: H_c commands with two entries each, and the slacks.
+
+    Args:
+        p: parameters.
+    """
+    return 2 * p.driver.H_c + SLACKS
 
 
 @jit_inlined
@@ -123,9 +138,9 @@ def build_program(
         u_h_act: the driver's present actual command u_h,act(k) [m/s^2, rad], shape (2,).
         p: parameters.
         work: record of :data:`condensing.WORKSPACE`.
-        P: quadratic cost, symmetric, written, shape (n + 1, n + 1) with n = 2 H_c.
-        q: linear cost, written, shape (n + 1,).
-        A: constraint matrix, written, shape (:func:`count_rows`, n + 1).
+        P: quadratic cost, symmetric, written, shape (n, n) with n = :func:`count_variables`.
+        q: linear cost, written, shape (n,).
+        A: constraint matrix, written, shape (:func:`count_rows`, n).
         low, high: bounds of the rows of A, written, one entry per row.
     """
     w, dt = p.driver, p.task.dt
@@ -150,7 +165,7 @@ def build_program(
     heading, wheel = (cos(scene.z[PSI]), sin(scene.z[PSI])), (cos(delta), sin(delta))
     rows = count_rows(p)
     for i in range(rows):
-        for c in range(n + 1):
+        for c in range(n + SLACKS):
             A[i, c] = 0.0
     for i in range(H_p):
         columns = 2 * min(i, w.H_c - 1) + 2
@@ -199,28 +214,28 @@ def build_program(
         low[H_p + i], high[H_p + i] = lower - z_next[Y], UNBOUNDED
         z, z_next = z_next, z
     first = 2 * H_p
+    for c in range(n):
+        A[first, c] = sens[S, c] * (p.limits.a_max if c % 2 == 0 else p.limits.delta_max)
+    A[first, n + 1] = -1.0
+    low[first], high[first] = -UNBOUNDED, scene.area.end - z[S]
+    first += 1
     if internal:
-        for c in range(n):
-            A[first, c] = sens[S, c] * (p.limits.a_max if c % 2 == 0 else p.limits.delta_max)
-        A[first, n] = -1.0
-        low[first], high[first] = -UNBOUNDED, scene.area.end - z[S]
-        first += 1
         for c in range(n):
             work.hessian[c, c] += SHARE_OF_DESIRED * (w.Q_a if c % 2 == 0 else w.Q_delta)
     else:
         for j in range(w.H_c):
             work.trial[j, 0] = work.trial[j, 1] = 0.0
         add_effort(work, w, work.trial)
-    for c in range(n + 1):
+    for c in range(n + SLACKS):
         A[first + c, c] = 1.0
-        low[first + c], high[first + c] = -1.0, 1.0
-    low[first + n], high[first + n] = 0.0, UNBOUNDED
-    for c in range(n):
-        P[c, n] = P[n, c] = 0.0
+        low[first + c], high[first + c] = (-1.0, 1.0) if c < n else (0.0, UNBOUNDED)
+        for e in range(n, n + SLACKS):
+            P[c, e] = P[e, c] = 0.0
     for c in range(n):
         bound_c = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
         q[c] = 2.0 * work.gradient[c] * bound_c
         for e in range(n):
             bound_e = p.limits.a_max if e % 2 == 0 else p.limits.delta_max
             P[c, e] = 2.0 * work.hessian[c, e] * bound_c * bound_e
-    P[n, n], q[n] = 2.0 * SLACK_QUADRATIC, SLACK_LINEAR
+    for e in range(n, n + SLACKS):
+        P[e, e], q[e] = 2.0 * SLACK_QUADRATIC, SLACK_LINEAR

@@ -35,6 +35,16 @@ _RESPONSE = 1_000_000_000
 
 
 @jit
+def response_time(p: Parameters) -> float:
+    """Time from noticing to acting [s]: log-normal over persons, constant throughout an episode.
+
+    Args:
+        p: parameters.
+    """
+    return p.person.response * exp(p.person.response_spread * standard_normal(p.person.seed, _RESPONSE))
+
+
+@jit
 def clear_person(memory: PersonMemory, p: Parameters) -> None:
     """Reset the person's memory at the start of an episode; the parameters say whether the person drives already.
 
@@ -45,6 +55,7 @@ def clear_person(memory: PersonMemory, p: Parameters) -> None:
     """
     memory.engaged = p.person.engaged
     memory.noticed = np.inf
+    memory.response = 0.0 if p.person.engaged else response_time(p)
     memory.reason = NOTHING
     for i in range(4):
         memory.error[i] = 0.0
@@ -133,16 +144,6 @@ def what_is_noticed(seen: Scene, p: Parameters) -> int:
     return DISPLAY if seen.displayed < person.display else NOTHING
 
 
-@jit
-def response_time(p: Parameters) -> float:
-    """Time from noticing to acting [s]: log-normal over persons, constant throughout an episode.
-
-    Args:
-        p: parameters.
-    """
-    return p.person.response * exp(p.person.response_spread * standard_normal(p.person.seed, _RESPONSE))
-
-
 @jit_inlined
 def perceive_and_attend(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Parameters, seen: Scene) -> bool:
     """Advance perception and attention by one step: compute the perceived scene and whether the person drives.
@@ -166,7 +167,7 @@ def perceive_and_attend(scene: Scene, u_last: np.ndarray, memory: PersonMemory, 
             memory.reason = what_is_noticed(seen, p)
             if memory.reason != NOTHING:
                 memory.noticed = scene.t
-        memory.engaged = scene.t >= memory.noticed + response_time(p)
+        memory.engaged = scene.t >= memory.noticed + memory.response
     return memory.engaged
 
 

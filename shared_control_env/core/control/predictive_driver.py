@@ -9,8 +9,8 @@ import numpy as np
 from shared_control_env.core.compile.calls import Interface
 from shared_control_env.core.compile.jit import jit_inlined
 from shared_control_env.core.control.condensing import Workspace
-from shared_control_env.core.control.driver import build_program, count_rows
-from shared_control_env.core.control.person import add_arm_noise, perceive_and_attend
+from shared_control_env.core.control.driver import build_program, count_rows, count_variables
+from shared_control_env.core.control.person import add_arm_noise, perceive_and_attend, response_time
 from shared_control_env.core.control.qp import active_set
 from shared_control_env.core.control.qp.active_set import MAX_ROWS, MAX_VARIABLES, SOLVED, solve_qp
 from shared_control_env.core.parameters import Parameters
@@ -55,6 +55,8 @@ class DriverReport:
         engaged: whether the person drives; if not, the hands rest.
         noticed: time at which a person with resting hands noticed something [s]; infinite before.
         reason: what the person noticed, index in person.REASONS.
+        response: time from noticing to acting of the person with resting hands [s]; 0 for other drivers.
+        K_h, T_h: gain [-] and time constant [s] of the driver's arm.
     """
 
     status: int
@@ -65,22 +67,27 @@ class DriverReport:
     engaged: bool
     noticed: float
     reason: int
+    response: float
+    K_h: float
+    T_h: float
 
 
 DRIVER_REPORT = record_dtype(DriverReport)
 
 
 @jit_inlined
-def clear_report(engaged: bool, report: DriverReport) -> None:
+def clear_report(p: Parameters, report: DriverReport) -> None:
     """Reset the driver's report at the start of an episode.
 
     Args:
-        engaged: whether the driver drives from the start.
+        p: parameters.
         report: record of :data:`DRIVER_REPORT`, overwritten.
     """
     report.status, report.iterations, report.failures = 0, 0, 0
     report.primal_residual, report.dual_residual = 0.0, 0.0
-    report.engaged, report.noticed, report.reason = engaged, np.inf, 0
+    report.engaged, report.noticed, report.reason = not p.person.active or p.person.engaged, np.inf, 0
+    report.response = response_time(p) if not report.engaged else 0.0
+    report.K_h, report.T_h = p.lag.K_h, p.lag.T_h
 
 
 def drive(
@@ -106,8 +113,9 @@ def drive(
         program: record of :data:`PROGRAM`, written.
         report: record of :data:`DRIVER_REPORT`, written.
     """
+    report.K_h, report.T_h = p.lag.K_h, p.lag.T_h
     if not p.person.active:
-        report.engaged, report.noticed, report.reason = True, np.inf, 0
+        report.engaged, report.noticed, report.reason, report.response = True, np.inf, 0, 0.0
         _solve(scene, p, memory, work, program, report)
         return
     program.seen = scene
@@ -119,6 +127,7 @@ def drive(
         report.status, report.iterations, report.failures = SOLVED, 0, memory.driver_failures
         report.primal_residual, report.dual_residual = 0.0, 0.0
     report.engaged, report.noticed, report.reason = person.engaged, person.noticed, person.reason
+    report.response = person.response
 
 
 @jit_inlined
@@ -128,7 +137,7 @@ def _solve(
     """Build and solve the program for a scene as the driver perceives it; the arguments are those of :func:`drive`."""
     g = program
     build_program(scene, memory.u_h_des, memory.u_h_act, p, work, g.P, g.q, g.A, g.low, g.high)
-    n, m = 2 * p.driver.H_c + 1, count_rows(p)
+    n, m = count_variables(p), count_rows(p)
     status, iterations, primal, dual = solve_qp(n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set)
     if status == SOLVED and np.isfinite(g.x[0] + g.x[1]):
         g.command[0] = min(max(g.x[0], -1.0), 1.0) * p.limits.a_max

@@ -59,7 +59,7 @@ class Info:
         u_a_act: the automation's actual command, after the authority law.
         u_h_des: the driver's desired command.
         u_h_act: the driver's actual command.
-        u: command that drove the vehicle.
+        u: command of the vehicle.
         r_x, r_y: longitudinal and lateral risk [-].
         alpha_a: authority of the automation [-].
         prediction: predicted state xi(k + tau_p) = [x, y, psi, v, a, r] in the Cartesian frame.
@@ -71,6 +71,7 @@ class Info:
         fault_active: whether any degradation has set in; ground truth.
         automation: outcome of the automation's solver.
         speed: v_x after the step [m/s].
+        u_realised: what the car's actuators have made of the commands u; u itself without lag and rate limit.
         crashed: whether the ego has collided, after the step.
         on_road: whether the ego's centre lies between the edges of the road, after the step.
         in_lane: whether the ego's centre is in the lane to keep, after the step.
@@ -104,6 +105,7 @@ class Info:
     fault_active: bool
     automation: AutomationReport
     speed: float
+    u_realised: Vector2
     crashed: bool
     on_road: bool
     in_lane: bool
@@ -157,11 +159,13 @@ def note_outcome(speed: float, transition: Transition, memory: Memory, info: Inf
 
     Args:
         speed: v_x after the step [m/s].
+        u_realised: what the car's actuators have made of the commands u; u itself without lag and rate limit.
         transition: record of :data:`records.TRANSITION` after the step.
         memory: record of :data:`records.MEMORY`.
         info: record of :data:`INFO`, written from ``speed`` on.
     """
     info.speed, info.crashed, info.on_road = speed, transition.crashed, transition.on_road
+    info.u_realised[0], info.u_realised[1] = memory.realised[0], memory.realised[1]
     info.in_lane, info.lane_departures = memory.in_lane, memory.lane_departures
     for i in range(MAX_TERMS):
         info.rewards[i] = transition.terms[i]

@@ -150,7 +150,7 @@ def longitudinal_risk(
     v_e: float,
     neighbours: np.ndarray,
     length: float,
-    changing: bool,
+    change_weight: float,
     parameters: LongitudinalRiskParameters,
 ) -> float:
     """Longitudinal risk r_x (Eq. 7): weighted sum of the ratios of follower, leader and preceding vehicle.
@@ -162,20 +162,20 @@ def longitudinal_risk(
         neighbours: predicted rows ``[1 if present, s, v]`` [-, m, m/s] of follower, leader and preceding vehicle,
             shape (3, 3).
         length: vehicle length [m], subtracted if distances are bumper to bumper.
-        changing: whether the weights of a lane change are used.
+        change_weight: share of the weights of a lane change; the rest are those of lane keeping [-].
         parameters: weights and parameters of the field.
 
     Returns:
         Risk in [0, 1] [-].
     """
     risk = 0.0
-    weights = (parameters.w_f, parameters.w_l, parameters.w_p)
-    if changing:
-        weights = (parameters.w_f_change, parameters.w_l_change, parameters.w_p_change)
+    keeping = (parameters.w_f, parameters.w_l, parameters.w_p)
+    during = (parameters.w_f_change, parameters.w_l_change, parameters.w_p_change)
     for i in range(3):
         if neighbours[i, 0] > 0.0:
             dx = neighbours[i, 1] - s_e
             if parameters.bumper_to_bumper:
                 dx = max(dx - length, 0.0) if dx >= 0.0 else min(dx + length, -0.0)
-            risk += weights[i] * pair_risk(v_e, neighbours[i, 2], dx, parameters)
+            weight = keeping[i] + change_weight * (during[i] - keeping[i])
+            risk += weight * pair_risk(v_e, neighbours[i, 2], dx, parameters)
     return min(risk, 1.0)

@@ -24,3 +24,26 @@ def change_progress(t: float, onset: float, duration: float) -> float:
         return 0.0
     tau = min((t - onset) / duration, 1.0)
     return tau * tau * tau * (10.0 + tau * (6.0 * tau - 15.0))
+
+
+@jit
+def change_weight(t: float, onset: float, duration: float) -> float:
+    """Share of Table V's weights of a lane change in Eq. 7; the rest are the weights of lane keeping.
+
+    Readings: the weights jump where the change begins and ends, or pass over smoothly. A jump alone moves alpha_a from
+    0.93 to 0.13 within a step. The share therefore rises over the first quarter of the change and falls over the last,
+    ``3 x^2 - 2 x^3`` in the share x of the quarter.
+
+    Args:
+        t: time [s].
+        onset: time at which the lane change begins [s]; infinite for none.
+        duration: duration of the lane change [s].
+
+    Returns:
+        Share in [0, 1] [-].
+    """
+    if t <= onset or t >= onset + duration:
+        return 0.0
+    tau = (t - onset) / duration
+    x = min(4.0 * min(tau, 1.0 - tau), 1.0)
+    return x * x * (3.0 - 2.0 * x)

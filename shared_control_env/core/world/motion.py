@@ -14,12 +14,14 @@ from shared_control_env.core.records import (
     BODY_WIDTH,
     HEADING,
     SPEED,
+    Memory,
     Signals,
     Transition,
     X,
     Y,
     record_dtype,
 )
+from shared_control_env.core.world.actuator import actuate
 from shared_control_env.core.world.collision import overlap
 from shared_control_env.core.world.traffic import decide_acceleration, move_along
 from shared_control_env.core.world.vehicle import plant_step
@@ -47,6 +49,7 @@ def move(
     traffic: np.ndarray,
     plans: np.ndarray,
     line: np.ndarray,
+    memory: Memory,
     transition: Transition,
     work: Motion,
 ) -> None:
@@ -56,23 +59,25 @@ def move(
         k: time step of the decision.
         frames: number of simulation steps.
         dt: duration of a simulation step [s].
-        signals: record of :data:`records.SIGNALS`; its ``u`` drives the ego.
+        signals: record of :data:`records.SIGNALS`; its ``u`` commands the ego.
         p: parameters.
         state: ego ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
         traffic: other vehicles, overwritten, shape (M, 8).
         plans: their plans, records of :class:`core.parameters.TrafficParameters`, shape (M,).
         line: reference line of the road, shape (n, 6).
+        memory: record of :data:`records.MEMORY`; the output of the actuators, ``realised``, is updated.
         transition: record of :data:`records.TRANSITION`; ``crashed`` is set on a collision.
         work: scratch.
     """
-    u, row = signals.u, work.row
+    realised, row = memory.realised, work.row
     row[BODY_LENGTH], row[BODY_WIDTH] = p.vehicle.length, p.vehicle.width
     for frame in range(frames):
         t = (k * frames + frame) * dt
         row[X], row[Y], row[SPEED] = state[0], state[1], state[3]
         for j in range(traffic.shape[0]):
             decide_acceleration(traffic[j], plans[j], t, row, traffic, line, p.task.lane_width)
-        plant_step(state, u[0], u[1], dt, p.vehicle, work.plant)
+        actuate(signals.u, dt, p.actuator, realised)
+        plant_step(state, realised[0], realised[1], dt, p.vehicle, work.plant)
         row[X], row[Y], row[HEADING] = state[0], state[1], state[2]
         for j in range(traffic.shape[0]):
             move_along(traffic[j], plans[j], line, t, dt)
@@ -83,5 +88,5 @@ def move(
 
 _PLANS = types.Array(from_dtype(record_dtype(TrafficParameters)), 1, "C")
 
-MOVE = Interface(None, int, int, float, Signals, Parameters, VECTOR, MATRIX, _PLANS, MATRIX, Transition, Motion)
-"""``move(k, frames, dt, signals, p, state, traffic, plans, line, transition, work)``, compiled apart from the loop."""
+MOVE = Interface(None, int, int, float, Signals, Parameters, VECTOR, MATRIX, _PLANS, MATRIX, Memory, Transition, Motion)
+"""``move(k, frames, dt, signals, p, state, traffic, plans, line, memory, transition, work)``, compiled by itself."""

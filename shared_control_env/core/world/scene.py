@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, isnan, sin
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from shared_control_env.core.records import (
     X,
     Y,
 )
-from shared_control_env.core.world.lane_change import change_progress
+from shared_control_env.core.world.lane_change import change_progress, change_weight
 from shared_control_env.core.world.road import curvature_at, locate, wrap_angle
 
 _SHORTEST_REGION = 0.5
@@ -56,17 +56,26 @@ def _keep_nearest(neighbours: np.ndarray, which: int, row: int, s: float, d: flo
 
 @jit_inlined
 def find_neighbours(
-    line: np.ndarray, traffic: np.ndarray, s_e: float, y_target: float, lane_width: float, neighbours: np.ndarray
+    line: np.ndarray,
+    traffic: np.ndarray,
+    s_e: float,
+    y_target: float,
+    y_goal: float,
+    lane_width: float,
+    neighbours: np.ndarray,
 ) -> None:
     """Find the preceding vehicle in the lane to keep, and the leader and the follower in the adjacent lanes.
 
-    A vehicle belongs to the lane that contains its centre. Positions are those of the centres.
+    A vehicle belongs to the lane that contains its centre. Positions are those of the centres. During a lane change the
+    follower is that in the lane changed to, from the first to the last step: it is the vehicle that the change can cut
+    off, even when the lane to keep is already the new one.
 
     Args:
         line: reference line, shape (m, 6).
         traffic: other vehicles, columns as in :mod:`records`, shape (n, 8).
         s_e: the ego's path length [m].
         y_target: lateral position of the centre of the lane to keep [m].
+        y_goal: lateral position of the centre of the lane changed to [m]; NaN if no change is under way.
         lane_width: width of a lane [m].
         neighbours: rows of follower, leader and preceding vehicle, columns PRESENT to NEAR_ROW of :mod:`records`,
             written, shape (3, 5).
@@ -77,11 +86,11 @@ def find_neighbours(
         s, d, psi_road, _ = locate(line, traffic[row, X], traffic[row, Y])
         v = traffic[row, SPEED] * cos(traffic[row, HEADING] - psi_road)
         offset = abs(d - y_target)
-        if offset <= 0.5 * lane_width:
-            if s >= s_e:
-                _keep_nearest(neighbours, PRECEDING, row, s, d, v, s_e)
-        elif offset <= 1.5 * lane_width:
-            _keep_nearest(neighbours, LEADER if s >= s_e else FOLLOWER, row, s, d, v, s_e)
+        if s >= s_e:
+            if offset <= 1.5 * lane_width:
+                _keep_nearest(neighbours, PRECEDING if offset <= 0.5 * lane_width else LEADER, row, s, d, v, s_e)
+        elif abs(d - y_goal) <= 0.5 * lane_width or (isnan(y_goal) and 0.5 * lane_width < offset <= 1.5 * lane_width):
+            _keep_nearest(neighbours, FOLLOWER, row, s, d, v, s_e)
 
 
 @jit
@@ -147,9 +156,11 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
         scene.kappa[i] = curvature_at(line, s_e + i * task.dt * state[3], 0.0)
     progress = change_progress(scene.t, task.change_onset, task.change_duration)
     scene.changing = 0.0 < progress < 1.0
+    scene.change_weight = change_weight(scene.t, task.change_onset, task.change_duration)
     scene.y_target = task.y_target + (task.y_goal - task.y_target) * progress
     lane = task.y_target if progress < 0.5 else task.y_goal
-    find_neighbours(line, traffic, s_e, lane, task.lane_width, scene.neighbours)
+    goal = task.y_goal if scene.changing else np.nan
+    find_neighbours(line, traffic, s_e, lane, goal, task.lane_width, scene.neighbours)
     preceding = scene.neighbours[PRECEDING]
     scene.v_target = task.target_speed
     end = s_e + p.safe_area.look_ahead

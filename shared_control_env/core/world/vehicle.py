@@ -9,7 +9,7 @@ Axes follow ISO 8855: x forward, y to the left, positive steering and yaw rate t
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -28,15 +28,31 @@ GRAVITY = 9.81
 """Gravitational acceleration [m/s^2]."""
 
 SLOWEST_SLIP = 0.5
-"""Smallest speed with which the slip angles of nonlinear tyres are computed [m/s]."""
+"""Smallest speed in the slip of nonlinear tyres [m/s].
+
+Without it a car that slides sideways would lose its lateral velocity at once where v_x reaches 0. Linear tyres need
+none: their force grows without bound.
+"""
+
+SMALLEST_SLIP = 1e-9
+"""Slip angle below which the secant of a tyre's force is its slope at zero [rad]."""
+
+LONGITUDINAL_SHARE = 0.9
+"""Largest share of the friction that acceleration and braking use [-]; assumed.
+
+An anti-lock brake leaves the tyres a lateral force: sqrt(1 - 0.9^2) = 0.44 of the friction.
+"""
 
 _force = FORCE.call
 
 Direction: TypeAlias = tuple[float, float]
 """Cosine and sine of an angle."""
 
-Axles: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
-"""Stiffness K [N/rad] and offset F [N] of the front and the rear axle; an axle's lateral force is ``F - K slip``."""
+Axles: TypeAlias = tuple[float, float, float]
+"""Stiffness K of the front and the rear axle [N/rad], and the smallest speed v_s in a slip [m/s].
+
+An axle's lateral force is ``-K slip``; the slip is its lateral velocity divided by ``max(v_x, v_s)``.
+"""
 
 
 @jit_allocating
@@ -106,9 +122,8 @@ def implicit_step(
         psi+  = psi + h (r+ - kappa s')        s+ = s + h s'
         y+    = y + h (v sin(psi+) + v_y+ cos(psi+))
 
-    with the stiffness ``K = 2 C`` of an axle and ``c = cos(delta)``. Nonlinear tyres add the offset of
-    :func:`axles_at`. The step is of first order in h. Sines and cosines are passed on from step to step, since they
-    cost as much as the rest of the step.
+    with the stiffness ``K = 2 C`` of an axle and ``c = cos(delta)``. The step is of first order in h. Sines and cosines
+    are passed on from step to step, since they cost as much as the rest of the step.
 
     Args:
         z: state, shape (6,).
@@ -140,7 +155,7 @@ def _implicit_step(
     axles: Axles,
     z_next: np.ndarray,
 ) -> Direction:
-    """:func:`implicit_step` with given stiffness and offset of the axles."""
+    """:func:`implicit_step` with a given stiffness of the axles."""
     (v, v_y, r), _ = _step_velocities(z, a, delta, wheel, h, vehicle, axles)
     heading, _ = _step_pose(z, heading, v, v_y, r, kappa, h, z_next)
     z_next[V_X], z_next[V_Y], z_next[R] = v, v_y, r
@@ -149,34 +164,62 @@ def _implicit_step(
 
 @jit_inlined
 def linear_axles(vehicle: VehicleParameters) -> Axles:
-    """Stiffness and offset of both axles with the linear tyres of Eq. 11: ``K = 2 C``, without an offset.
+    """Both axles with the linear tyres of Eq. 11: ``K = 2 C``.
 
     Args:
         vehicle: parameters of the vehicle.
     """
-    return (2.0 * vehicle.C_f, 0.0), (2.0 * vehicle.C_r, 0.0)
+    return 2.0 * vehicle.C_f, 2.0 * vehicle.C_r, 0.0
 
 
 @jit
-def axles_at(z: np.ndarray, delta: float, vehicle: VehicleParameters) -> Axles:
-    """Stiffness K and offset F of the front and the rear axle; an axle's lateral force is ``F - K slip``.
+def transmitted(a: float, vehicle: VehicleParameters) -> float:
+    """Acceleration that the tyres transmit [m/s^2]: a share of the friction, without a limit for linear tyres.
 
-    Nonlinear tyres are linearised about the slip angle of the state. Each tyre has its static load.
+    Args:
+        a: commanded acceleration [m/s^2].
+        vehicle: parameters of the vehicle.
+    """
+    if vehicle.tyre == 0:
+        return a
+    bound = LONGITUDINAL_SHARE * vehicle.mu * GRAVITY
+    return min(max(a, -bound), bound)
+
+
+@jit_inlined
+def axles_at(z: np.ndarray, a: float, delta: float, vehicle: VehicleParameters) -> Axles:
+    """Both axles at a state: their stiffness is the secant of the tyres' forces at the present slip.
+
+    Readings: tangent or secant. The tangent is 0 where a tyre slides, and the implicit step is then singular at
+    standstill. The secant damps at every slip, and agrees to first order in the step.
+
+    Each tyre has its static load. The longitudinal force is shared in proportion to the loads, so that all tyres use
+    up the same share of their friction: the friction ellipse leaves ``mu_y = mu sqrt(1 - (a / (mu g))^2)`` to the
+    lateral force.
 
     Args:
         z: state, shape (6,).
+        a: transmitted acceleration [m/s^2].
         delta: front steering angle [rad].
         vehicle: parameters of the vehicle.
     """
     if vehicle.tyre == 0:
         return linear_axles(vehicle)
     v = max(z[V_X], SLOWEST_SLIP)
-    slip_f, slip_r = (z[V_Y] + vehicle.l_f * z[R]) / v - delta, (z[V_Y] - vehicle.l_r * z[R]) / v
+    used = a / (vehicle.mu * GRAVITY)
+    mu_y = vehicle.mu * sqrt(1.0 - used * used)
     load = 0.5 * vehicle.m * GRAVITY / (vehicle.l_f + vehicle.l_r)
-    force_f, slope_f = _force(vehicle.tyre, slip_f, vehicle.C_f, vehicle.mu, load * vehicle.l_r)
-    force_r, slope_r = _force(vehicle.tyre, slip_r, vehicle.C_r, vehicle.mu, load * vehicle.l_f)
-    front = -2.0 * slope_f, 2.0 * (force_f - slope_f * slip_f)
-    return front, (-2.0 * slope_r, 2.0 * (force_r - slope_r * slip_r))
+    slip_f = (z[V_Y] + vehicle.l_f * z[R] - z[V_X] * delta) / v
+    slip_r = (z[V_Y] - vehicle.l_r * z[R]) / v
+    front = _secant(vehicle.tyre, slip_f, vehicle.C_f, mu_y, load * vehicle.l_r)
+    return 2.0 * front, 2.0 * _secant(vehicle.tyre, slip_r, vehicle.C_r, mu_y, load * vehicle.l_f), SLOWEST_SLIP
+
+
+@jit
+def _secant(tyre: int, slip: float, C: float, mu: float, F_z: float) -> float:
+    """Stiffness K of one tyre with the force ``-K slip`` [N/rad]."""
+    force, slope = _force(tyre, slip, C, mu, F_z)
+    return -slope if abs(slip) < SMALLEST_SLIP else -force / slip
 
 
 @jit_inlined
@@ -191,17 +234,15 @@ def _step_velocities(
     v_y, r = z[V_Y], z[R]
     v = max(0.0, z[V_X] + h * (a + r * v_y))
     l_f, l_r = vehicle.l_f, vehicle.l_r
-    (K_f, F_f), (K_r, F_r) = axles
+    K_f, K_r, slowest = axles
+    v_s = max(v, slowest)
     K_fc, h_m, h_I = K_f * wheel[0], h / vehicle.m, h / vehicle.I_z
-    m11 = v + h_m * (K_fc + K_r)
-    m12 = h * v * v + h_m * (K_fc * l_f - K_r * l_r)
+    m11 = v_s + h_m * (K_fc + K_r)
+    m12 = h * v * v_s + h_m * (K_fc * l_f - K_r * l_r)
     m21 = h_I * (l_f * K_f - l_r * K_r)
-    m22 = v + h_I * (l_f * l_f * K_f + l_r * l_r * K_r)
-    b1 = v * v_y + h_m * K_fc * delta * v
-    b2 = v * r + h_I * l_f * K_f * delta * v
-    if F_f != 0.0 or F_r != 0.0:
-        b1 += h_m * (F_f * wheel[0] + F_r) * v
-        b2 += h_I * (l_f * F_f - l_r * F_r) * v
+    m22 = v_s + h_I * (l_f * l_f * K_f + l_r * l_r * K_r)
+    b1 = v_s * v_y + h_m * K_fc * delta * v
+    b2 = v_s * r + h_I * l_f * K_f * delta * v
     scale = 1.0 / (m11 * m22 - m12 * m21)
     i11, i12, i21, i22 = m22 * scale, -m12 * scale, -m21 * scale, m11 * scale
     return (v, i11 * b1 + i12 * b2, i21 * b1 + i22 * b2), (i11, i12, i21, i22)
@@ -322,7 +363,7 @@ def tyre_step(
     Args:
         z: state, shape (6,).
         heading: cosine and sine of psi.
-        a: acceleration command [m/s^2].
+        a: transmitted acceleration [m/s^2].
         delta: front steering angle [rad].
         wheel: cosine and sine of delta.
         h: step [s].
@@ -332,7 +373,7 @@ def tyre_step(
     Returns:
         Cosine and sine of the new psi.
     """
-    return _implicit_step(z, heading, a, delta, wheel, 0.0, h, vehicle, axles_at(z, delta, vehicle), z_next)
+    return _implicit_step(z, heading, a, delta, wheel, 0.0, h, vehicle, axles_at(z, a, delta, vehicle), z_next)
 
 
 @jit
@@ -373,5 +414,6 @@ def plant_step(z: np.ndarray, a: float, delta: float, dt: float, vehicle: Vehicl
         vehicle: parameters of the vehicle.
         work: scratch, shape (2, 6).
     """
+    a = transmitted(a, vehicle)
     for _ in range(PLANT_SUBSTEPS):
         extrapolated_step(z, a, delta, dt / PLANT_SUBSTEPS, vehicle, work)

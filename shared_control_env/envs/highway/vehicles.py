@@ -102,6 +102,7 @@ class EgoVehicle(ArrayVehicle):
         parameters: record of :class:`core.parameters.Parameters`.
 
     Attributes:
+        realised: output of the actuators [m/s^2, rad], shape (2,).
         target_speed: target speed [m/s]; highway-env's MOBIL expects this attribute of every vehicle.
         parameters: record of :class:`core.parameters.Parameters`.
     """
@@ -117,6 +118,7 @@ class EgoVehicle(ArrayVehicle):
         self.action = {"acceleration": 0.0, "steering": 0.0}
         self.target_speed = target_speed
         self.color = VehicleGraphics.EGO_COLOR
+        self.realised, self._command = np.zeros(2), np.zeros(2)
         self._work = np.zeros((2, 6))
 
     @property
@@ -126,13 +128,14 @@ class EgoVehicle(ArrayVehicle):
         return np.array([v_x * np.cos(psi) - v_y * np.sin(psi), v_x * np.sin(psi) + v_y * np.cos(psi)])
 
     def step(self, dt: float) -> None:
-        """Advance the dynamics by one simulation step under the stored action.
+        """Advance actuators and dynamics by one simulation step under the stored action.
 
         Args:
             dt: simulation step [s].
         """
-        action = self.action
-        entries.step_plant(self.array, action["acceleration"], action["steering"], dt, self.parameters, self._work)
+        u = self._command
+        u[0], u[1] = self.action["acceleration"], self.action["steering"]
+        entries.step_plant(self.array, u, self.realised, dt, self.parameters, self._work)
 
 
 class LaneFollower(ArrayVehicle):

@@ -33,7 +33,7 @@ NOT_DRAWN = (
     *("simulation_frequency", "policy_frequency"),
     *("screen_width", "screen_height", "centering_position", "scaling"),
     *("offscreen_rendering", "real_time_rendering", "neighbour_vehicles_connected_lanes", "other_vehicles_type"),
-    *("degradations", "randomise"),
+    *("degradations", "randomise", "persons"),
 )
 """Settings that must be the same in all episodes of an environment."""
 
@@ -329,6 +329,8 @@ def _check_idle(settings: Settings) -> None:
     """Check that no setting is changed that would have no effect beside the other settings."""
     reason = "the tyres are linear, and know no friction"
     _refuse_idle("config['vehicle']", settings.vehicle, "mu", settings.vehicle.tyre != "linear", reason)
+    true, believed = settings.vehicle.tyre, settings.model.tyre
+    _refuse_idle("config['model']", settings.model, "mu", (believed or true) != "linear", reason)
     repeated = [name for name, count in Counter(settings.terms).items() if count > 1]
     if repeated:
         raise ValueError(f"config['reward_terms'] names {repeated[0]!r} more than once")
@@ -357,11 +359,14 @@ def _check_idle(settings: Settings) -> None:
         _refuse_idle(
             "config['internal_model']", model, field, model.active, "the driver has no internal model (active)"
         )
+    for field in type(settings.person).model_fields:
+        reason = "config['persons'] says who drives"
+        _refuse_idle("config['person']", settings.person, field, field == "seed" or not settings.persons, reason)
     person, longest = settings.person, (MAX_DELAY - 1) / settings.policy_frequency
     if person.delay > longest:
         raise ValueError(f"config['person']['delay'] = {person.delay} s must lie in [0, {longest:g}] at this frequency")
     for field in type(person).model_fields:
-        _refuse_idle("config['person']", person, field, field == "active" or person.active, "there is no person")
+        _refuse_idle("config['person']", person, field, field == "active" or settings.has_person, "there is no person")
     for field in ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "response"):
         resting = not person.engaged
         _refuse_idle("config['person']", person, field, resting, "this person drives from the start (engaged)")

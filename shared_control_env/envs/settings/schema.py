@@ -197,7 +197,10 @@ class SolverSettings(Section):
 
 
 class ModelSettings(Section):
-    """The car as controllers, person and risk assessment take it to be, with linear tyres; None for the true value."""
+    """The car as controllers, person and risk assessment take it to be; None for the true value.
+
+    Tyre and friction concern the risk assessment; controllers and person assume linear tyres.
+    """
 
     m: core.Mass | None = None  # [kg]
     I_z: core.Inertia | None = None  # [kg m^2]
@@ -205,6 +208,17 @@ class ModelSettings(Section):
     l_r: core.BodyLength | None = None  # [m]
     C_f: core.Stiffness | None = None  # [N/rad]
     C_r: core.Stiffness | None = None  # [N/rad]
+    mu: core.Friction | None = None  # [-]
+    tyre: name_in(TYRES) | None = None
+
+
+class ActuatorSettings(Section):
+    """Actuators of the car (core.world.actuator). The default is the paper's car, which has none."""
+
+    acceleration_lag: core.ActuatorLag = 0.0  # [s]; 0 for none
+    steering_lag: core.ActuatorLag = 0.0  # [s]; 0 for none
+    acceleration_rate: Positive | None = None  # [m/s^3]; None for no limit
+    steering_rate: Positive | None = None  # [rad/s]; None for no limit
 
 
 class ObservationSettings(Section):
@@ -285,9 +299,11 @@ class Settings(Section):
     driver_lag: _Lag = _Lag()
     internal_model: InternalModelSettings = InternalModelSettings()
     person: _Person = _Person()
+    persons: list[name_in(core.PERSONS)] = []  # one of these drives in each episode, instead of the settings of person
     limits: _Limits = _Limits()
     vehicle: _Vehicle = _Vehicle()
     model: ModelSettings = ModelSettings()
+    actuator: ActuatorSettings = ActuatorSettings()
     observation: ObservationSettings = ObservationSettings()
     reward: _Reward = _Reward()
     reward_terms: Annotated[list[TermSettings], MaxLen(MAX_TERMS - len(STANDARD))] = []
@@ -305,7 +321,7 @@ class Settings(Section):
     @property
     def has_person(self) -> bool:
         """Whether the predictive driver is the model of a person."""
-        return self.person.active
+        return self.person.active or bool(self.persons)
 
     @property
     def road_length(self) -> float:

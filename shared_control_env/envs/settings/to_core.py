@@ -36,6 +36,12 @@ def parameters_of(settings: Settings) -> core.Parameters:
     return core.Parameters(
         vehicle=core.VehicleParameters(**values(settings.vehicle, tyre=tyre.address_of(settings.vehicle.tyre))),
         model=model_of(settings),
+        actuator=core.ActuatorParameters(
+            settings.actuator.acceleration_lag,
+            settings.actuator.steering_lag,
+            settings.actuator.acceleration_rate or math.inf,
+            settings.actuator.steering_rate or math.inf,
+        ),
         limits=core.Limits(**values(settings.limits)),
         automation=core.PredictiveParameters(**values(settings.automation)),
         driver=core.PredictiveParameters(**values(settings.driver)),
@@ -74,13 +80,13 @@ def parameters_of(settings: Settings) -> core.Parameters:
 
 
 def model_of(settings: Settings) -> core.VehicleParameters:
-    """The vehicle parameters that the controllers assume, with linear tyres.
+    """The vehicle parameters that controllers, person and risk assessment assume.
 
     Args:
         settings: checked settings.
     """
-    believed = settings.model.model_dump(exclude_none=True)
-    return core.VehicleParameters(**{**settings.vehicle.model_dump(), "tyre": 0, **believed})
+    believed = {**settings.vehicle.model_dump(), **settings.model.model_dump(exclude_none=True)}
+    return core.VehicleParameters(**{**believed, "tyre": tyre.address_of(believed["tyre"])})
 
 
 def reward_of(settings: Settings) -> core.RewardParameters:

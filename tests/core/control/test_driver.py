@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from shared_control_env.controllers.driver import PredictiveDriver
 from shared_control_env.core import entries
 from shared_control_env.core.control import condensing
-from shared_control_env.core.control.driver import SHARE_OF_DESIRED, SLACK_LINEAR, SLACK_QUADRATIC
+from shared_control_env.core.control.driver import SHARE_OF_DESIRED, SLACK_LINEAR, SLACK_QUADRATIC, SLACKS
 from shared_control_env.core.parameters import InternalModelParameters, Parameters
 from shared_control_env.core.records import pack
 from shared_control_env.core.world.vehicle import implicit_step_jacobian
@@ -16,7 +17,7 @@ BOUNDS = np.array([5.0, np.pi / 6])
 
 def build(parameters, scene, u_last, u_h_act):
     w = parameters.driver
-    n, rows = 2 * w.H_c + 1, 2 * w.H_p + parameters.internal_model.active
+    n, rows = 2 * w.H_c + SLACKS, 2 * w.H_p + 1
     P, q, A = np.zeros((n, n)), np.zeros(n), np.zeros((rows + n, n))
     low, high = np.zeros(rows + n), np.zeros(rows + n)
     work = np.zeros((), condensing.WORKSPACE)
@@ -74,21 +75,22 @@ def test_cost_and_rows_are_those_of_the_rollout(active, horizons, seed):
 
     def both(x):
         cost, states = rollout(parameters, scene, x[:n].reshape(-1, 2) * BOUNDS, u_last, u_h_act)
-        return 0.5 * x @ P @ x + q @ x - SLACK_LINEAR * x[n] - SLACK_QUADRATIC * x[n] ** 2, cost, states
+        slack = SLACK_LINEAR * x[n:].sum() + SLACK_QUADRATIC * (x[n:] ** 2).sum()
+        return 0.5 * x @ P @ x + q @ x - slack, cost, states
 
-    zero, constant, at_zero = both(np.zeros(n + 1))
+    zero, constant, at_zero = both(np.zeros(n + SLACKS))
     assert zero == 0.0
     for _ in range(5):
-        x = np.append(rng.uniform(-1.0, 1.0, n), 0.0)
+        x = np.append(rng.uniform(-1.0, 1.0, n), rng.uniform(0.0, 1.0, SLACKS))
         value, cost, states = both(x)
         assert value == pytest.approx(cost - constant, rel=1e-9, abs=1e-9)
         rows = A @ x
-        np.testing.assert_allclose(rows[:H_p], states[:, 1] - at_zero[:, 1], atol=1e-10)
-        np.testing.assert_allclose(rows[H_p : 2 * H_p], rows[:H_p], atol=1e-12)
-        np.testing.assert_allclose(rows[-n - 1 : -1], x[:n])
-        if active:
-            assert rows[2 * H_p] == pytest.approx(states[-1, 0] - at_zero[-1, 0], abs=1e-9)
-            assert high[2 * H_p] == pytest.approx(float(scene["area"]["end"]) - at_zero[-1, 0], abs=1e-9)
+        moved = states[:, 1] - at_zero[:, 1]
+        np.testing.assert_allclose(rows[:H_p], moved - x[n], atol=1e-10)
+        np.testing.assert_allclose(rows[H_p : 2 * H_p], moved + x[n], atol=1e-10)
+        np.testing.assert_allclose(rows[-n - SLACKS :], x)
+        assert rows[2 * H_p] == pytest.approx(states[-1, 0] - at_zero[-1, 0] - x[n + 1], abs=1e-9)
+        assert high[2 * H_p] == pytest.approx(float(scene["area"]["end"]) - at_zero[-1, 0], abs=1e-9)
 
 
 def test_without_the_internal_model_the_arm_and_what_is_felt_do_not_matter():
@@ -99,3 +101,33 @@ def test_without_the_internal_model_the_arm_and_what_is_felt_do_not_matter():
     again = build(Parameters(), scene, np.array([0.5, 0.02]), np.array([2.0, 0.2]))
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("active", [False, True])
+def test_the_driver_brakes_for_the_end_of_the_safe_area(active):
+    """Eq. 15 keeps (x, y) in C: with 1 m of free road the driver brakes as hard as it can, with 55 m not at all."""
+    parameters = Parameters(internal_model=InternalModelParameters(active))
+    commands = []
+    for free in (1.0, 5.0, 55.0):
+        driver = PredictiveDriver(parameters)
+        scene = scene_of(np.array([0.0, 0.0, 0.0, 15.0, 0.0, 0.0]), pack(parameters))
+        scene["area"]["end"] = free
+        commands.append(driver.act(np.zeros(1), scene)[0])
+    assert commands[0] == pytest.approx(-5.0, abs=1e-3)
+    assert commands[0] - 1e-3 <= commands[1] < commands[2] - 1.0
+    assert commands[2] == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("active", [False, True])
+def test_a_car_that_cannot_stop_in_time_still_keeps_to_the_sides(active):
+    """The end of C has a slack of its own: the car steers back into its lane as on a free road, or nearly so."""
+    parameters = Parameters(internal_model=InternalModelParameters(active))
+    state = np.array([0.0, 1.0, 0.02, 15.0, 0.0, 0.0])
+    steering = []
+    for free in (0.5, 55.0):
+        driver = PredictiveDriver(parameters)
+        scene = scene_of(state, pack(parameters))
+        scene["area"]["end"] = free
+        steering.append(driver.act(np.zeros(1), scene)[1])
+    assert steering[1] < -0.1
+    assert steering[0] < 0.6 * steering[1]

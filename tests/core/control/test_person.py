@@ -62,7 +62,7 @@ def test_without_delay_and_noise_everything_is_seen_as_it_is():
 
 def test_the_own_model_makes_up_for_the_delay():
     """Driven by commands that the person gave, the car is where the model says, but for the plant's finer steps."""
-    env = gym.make("SharedControl/Bend-v0", config={"authority": {"law": "driver_only"}, "randomise": []})
+    env = gym.make("SharedControl/Bend-v1", config={"authority": {"law": "driver_only"}, "randomise": []})
     env.reset(seed=0)
     rng, scenes, commands = np.random.default_rng(1), [], []
     for _ in range(60):
@@ -165,7 +165,7 @@ CONFIG = {"internal_model": {"active": True}, "authority": {"law": "proportional
 
 
 @pytest.mark.parametrize("person", PERSONS)
-@pytest.mark.parametrize("name", ["SharedControl/TwoLane-v0", "SharedControl/Bend-v0", "SharedControl/CutIn-v0"])
+@pytest.mark.parametrize("name", ["SharedControl/TwoLane-v1", "SharedControl/Bend-v1", "SharedControl/CutIn-v1"])
 def test_the_person_in_the_kernel_is_the_one_from_python(name, person):
     differing = {
         field: value
@@ -190,7 +190,7 @@ def test_the_person_in_the_kernel_is_the_one_from_python(name, person):
 
 def test_hands_that_rest_do_nothing():
     config = {**CONFIG, "person": {"active": True, "engaged": False}, "faults": []}
-    env = gym.make_vec("SharedControl/TwoLane-v0", num_envs=1, driver=True, config=config)
+    env = gym.make_vec("SharedControl/TwoLane-v1", num_envs=1, driver=True, config=config)
     env.reset(seed=0)
     for _ in range(60):
         infos = env.step(None)[4]

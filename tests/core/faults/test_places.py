@@ -12,8 +12,8 @@ BIAS = [{"channel": "steering", "onset": 0.5, "size": 0.2}]
 def story(place, law, faults=BIAS, steps=40, **more):
     """Infos of an episode in both kinds of environments, held against one another."""
     config = {"fault_at": place, "authority": {"law": law}, "faults": faults, **more}
-    env = gym.make("SharedControl/TwoLane-v0", config=config)
-    many = gym.make_vec("SharedControl/TwoLane-v0", num_envs=2, config=config)
+    env = gym.make("SharedControl/TwoLane-v1", config=config)
+    many = gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, config=config)
     env.reset(seed=0)
     many.reset(seed=0)
     infos = []
@@ -52,7 +52,7 @@ def test_at_the_actuator_the_limiter_sees_nothing_and_cannot_help(law):
 @pytest.mark.parametrize("law", LAWS)
 def test_at_the_command_it_is_as_the_paper_has_it(law):
     plain = {"authority": {"law": law}, "faults": BIAS}
-    env = gym.make("SharedControl/TwoLane-v0", config=plain)
+    env = gym.make("SharedControl/TwoLane-v1", config=plain)
     env.reset(seed=0)
     for info in story("command", law):
         other = env.step(np.zeros(2))[4]
@@ -62,7 +62,7 @@ def test_at_the_command_it_is_as_the_paper_has_it(law):
 
 def test_a_law_that_needs_the_sound_command_is_refused_at_the_planner():
     with pytest.raises(ValueError, match=r"'fault_at'\] = 'planner' does not go with .*'paper'"):
-        gym.make("SharedControl/TwoLane-v0", config={"fault_at": "planner"})
+        gym.make("SharedControl/TwoLane-v1", config={"fault_at": "planner"})
 
 
 def test_stuck_at_the_actuator_holds_the_limited_command():

@@ -27,8 +27,8 @@ from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, record_dty
 SOLVED, ITERATION_LIMIT, FAILED = 0, 1, 2
 """Statuses. FAILED: infeasible, not strictly convex, too large, not finite, or too ill-conditioned to solve."""
 
-MAX_VARIABLES = 2 * MAX_CONTROL + 1
-"""Largest number of variables: the commands and one slack."""
+MAX_VARIABLES = 2 * MAX_CONTROL + 2
+"""Largest number of variables: the commands and two slacks."""
 
 MAX_ROWS = 2 * MAX_HORIZON + 1 + MAX_VARIABLES
 """Largest number of rows: both sides of the safe area at every stage, its end, and one bound per variable."""

@@ -11,6 +11,7 @@ from scipy.optimize import minimize
 
 from shared_control_env.core import entries
 from shared_control_env.core.control import condensing
+from shared_control_env.core.control.driver import SLACKS
 from shared_control_env.core.control.qp.active_set import (
     FAILED,
     ITERATION_LIMIT,
@@ -325,7 +326,7 @@ def driver_program(rng: Generator, H_c: int, H_p: int, internal: bool = False) -
     scene["region"] = [0.0, 40.0, -2.0, 2.0]
     compiled.search(triangulate_any(np.array([0.0, 40.0, -2.0, 2.0]), np.empty((0, 4, 2))), parameters, scene)
     scene["felt"] = rng.uniform([-2.0, -0.1], [2.0, 0.1])
-    n, rows = 2 * H_c + 1, 2 * H_p + internal
+    n, rows = 2 * H_c + SLACKS, 2 * H_p + 1
     P, q, A = np.zeros((n, n)), np.zeros(n), np.zeros((rows + n, n))
     low, high = np.zeros(rows + n), np.zeros(rows + n)
     u_last = rng.uniform([-5.0, -0.1], [5.0, 0.1])
@@ -367,7 +368,7 @@ def test_driver_programs_agree_with_osqp(H_c: int, H_p: int, count: int, unsolve
         program = driver_program(rng, H_c, H_p)
         x = assert_solved(program)
         expected = osqp_solution(program)
-        slack.append(x[-1])
+        slack.append(x[-SLACKS])
         if expected is None:
             unsolved -= 1
         else:

@@ -374,3 +374,9 @@ def test_highway_env_is_imported_without_pandas_and_pyplot_which_work_all_the_sa
     result = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
     assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_the_version_before_names_this_one(name):
+    with pytest.raises(gym.error.Error, match=name):
+        gym.make(name.replace("-v1", "-v0"))

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from shared_control_env.evaluation import evaluate
 from shared_control_env.evaluation import metrics as m
 from shared_control_env.evaluation.metrics import METRICS, Trajectory
 
@@ -155,3 +156,19 @@ def test_short_episodes_have_no_windowed_jerk():
     )
     assert np.isnan(METRICS["lateral_jerk_max"].measure(short))
     assert METRICS["iso_11270_violation"].measure(short) == 0.0
+
+
+def test_the_lateral_acceleration_is_that_of_the_centre_of_mass():
+    """In a slide the car yaws without a force: v_y' takes back what v_x r gives."""
+    t = 0.05 * np.arange(T)
+    spinning = {"yaw_rate": np.full(T, 1.0), "lateral_speed": -10.0 * t}  # v_x = 10 m/s: a straight path in space
+    assert METRICS["lateral_acceleration_max"].measure(trajectory(**spinning)) == pytest.approx(0.0, abs=1e-9)
+    assert METRICS["iso_11270_violation"].measure(trajectory(**spinning)) == 0.0
+
+
+def test_no_drive_of_the_suite_accelerates_beyond_the_friction():
+    """The worst driver of the catalogue under every law, on brush tyres: mu g, but for the averaging over a step."""
+    table = evaluate("mpc", ["driver_only", "none", "proportional", "paper"], "full", seeds=[0, 1])
+    friction = np.where(table["scenario"] == "wet_road", 0.5, 0.9)
+    assert (table["lateral_acceleration_max"] <= 1.05 * friction * 9.81).all()
+    assert table["lateral_acceleration_max"].max() > 8.0

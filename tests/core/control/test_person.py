@@ -19,7 +19,7 @@ from shared_control_env.core.parameters import (
     fitted_arms,
 )
 from shared_control_env.core.records import PERSON_MEMORY, SCENE, pack
-from shared_control_env.evaluation import DRIVERS, Suite, evaluate
+from shared_control_env.evaluation import DRIVERS, DriverEntry, Suite, evaluate
 from shared_control_env.wrappers import DriverModel
 from tests.scenes import scene_of, traffic
 
@@ -233,3 +233,52 @@ def test_persons_of_the_catalogue_say_what_they_are(name):
     entry = DRIVERS[name]
     assert entry.config["person"]["active"]
     assert {draw["setting"] for draw in entry.draws} == {"driver_lag.K_h", "driver_lag.T_h"}
+
+
+def test_a_population_draws_one_person_an_episode_from_the_environments_generator():
+    suite = Suite("one", ("bend",), ("step_bias",))
+    first, again = (evaluate("population", "none", suite, seeds=range(30)) for _ in range(2))
+    for column in ("person", "K_h", "T_h", "noticed"):
+        np.testing.assert_array_equal(first[column], again[column])
+    assert set(first["person"]) == set(PERSONS)
+    assert (first["person"].value_counts() > 3).all()
+    assert first["K_h"].nunique() == 30
+    assert (evaluate("internal_model", "none", suite)["person"] == "").all()
+    own = DriverEntry("mine", config={"person": {"active": True, "weber": 0.3}, "internal_model": {"active": True}})
+    assert (evaluate({"mine": own}, "none", suite)["person"] == "own").all()
+
+
+def test_the_road_does_not_depend_on_who_drives():
+    episodes = {}
+    for names in ([], ["hands_on"], list(PERSONS)):
+        env = DriverModel(gym.make("SharedControl/Bend-v1", config={"persons": names}))
+        env.reset(seed=4)
+        episode = env.unwrapped.episode
+        episodes[tuple(names)] = (episode.road, episode.ego, episode.vehicles)
+        assert episode.persons == []
+        assert episode.has_person == bool(names)
+    assert episodes[("hands_on",)] == episodes[tuple(PERSONS)]
+
+
+def test_the_person_is_in_info_in_both_kinds_of_environments():
+    config = {"persons": ["hands_off"], "driver_lag": {"K_h": 1.1, "T_h": 0.15}, "internal_model": {"active": True}}
+    single = DriverModel(gym.make("SharedControl/TwoLane-v1", config=config))
+    many = gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, driver=True, config=config)
+    infos = [single.reset(seed=5)[1]["driver"], {k: v[0] for k, v in many.reset(seed=5)[1]["driver"].items()}]
+    infos += [single.step(0)[4]["driver"], {k: v[0] for k, v in many.step(None)[4]["driver"].items()}]
+    for info in infos:
+        assert info["K_h"] == 1.1
+        assert info["T_h"] == 0.15
+        assert 0.3 < info["response"] < 20.0
+        assert not info["engaged"]
+    assert len({info["response"] for info in infos}) == 1
+
+
+def test_a_person_who_is_drawn_is_not_set_as_well():
+    both = {"persons": ["hands_on"], "person": {"active": True, "weber": 0.2}}
+    with pytest.raises(ValueError, match=r"\['person'\]\['active'\] = True would not act.*config\['persons'\]"):
+        gym.make("SharedControl/TwoLane-v1", config=both)
+    with pytest.raises(ValueError, match="did you mean 'hands_on'"):
+        gym.make("SharedControl/TwoLane-v1", config={"persons": ["hands_onn"]})
+    with pytest.raises(ValueError, match=r"config\['persons'\] would not act: it needs driver=True"):
+        gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, config={"persons": ["hands_on"]})

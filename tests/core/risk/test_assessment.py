@@ -59,16 +59,18 @@ def test_in_the_loop_too(name):
         predicted = info["prediction"][5]
 
 
-def test_alpha_a_does_not_oscillate_in_case_1():
-    """One implicit step of the controllers as prediction made it change by 0.137 in the mean step."""
-    env = DriverModel(gym.make("SharedControl/TwoLane-v1"))
+@pytest.mark.parametrize(("internal", "bound"), [(False, 0.02), (True, 0.01)])
+def test_alpha_a_does_not_oscillate_in_case_1(internal, bound):
+    """With one implicit step of the controllers as prediction it changed by 0.043 and 0.177 in the mean step."""
+    config = {"authority": {"law": "proportional"}, "internal_model": {"active": internal}}
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1", config=config))
     env.reset(seed=0)
     alphas, ended = [], False
     while not ended:
         _, _, terminated, truncated, info = env.step(0)
         alphas.append(info["alpha_a"])
         ended = terminated or truncated
-    assert np.abs(np.diff(alphas)).mean() < 0.02
+    assert np.abs(np.diff(alphas)).mean() < bound
     assert min(alphas) < 0.5
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -37,6 +37,32 @@ class Scaling(NamedTuple):
     one: Timing
     all: Timing | None
     ratio: float
+
+
+INTERNAL = {"internal_model": {"active": True}}
+
+VARIANTS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "a person at the wheel, against the same driver without": ({**INTERNAL, "persons": ["hands_on"]}, INTERNAL),
+    "brush tyres, against linear ones": ({"vehicle": {"tyre": "fiala"}}, {}),
+    "actuators, against none": ({"actuator": {"steering_lag": 0.1, "acceleration_lag": 0.1}}, {}),
+}
+"""Settings that cost time, and the settings that they are timed against, by what they are."""
+
+
+def variant(config: dict[str, Any], base: dict[str, Any], repeats: int) -> tuple[Timing, float]:
+    """Time the kernel with its driver under some settings, in turn with others, on one core.
+
+    Args:
+        config: the settings.
+        base: the settings to compare them with.
+        repeats: number of measured blocks of each.
+
+    Returns:
+        Time of an environment's step, and the speed relative to the base, median of the pairs [-].
+    """
+    ours, others = (_block("SharedControl/TwoLane-v1", 256, 1, True, each) for each in (config, base))
+    pairs = [(ours(), others()) for _ in range(repeats)]
+    return Timing.of([own for own, _ in pairs]), float(np.median([other / own for own, other in pairs]))
 
 
 def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/TwoLane-v1") -> Scaling:
@@ -70,9 +96,9 @@ def _rate(seconds: list[float]) -> float:
     return float(np.mean(1.0 / np.array(seconds)))
 
 
-def _block(id: str, num_envs: int, threads: int, driver: bool) -> Callable[[], float]:
+def _block(id: str, num_envs: int, threads: int, driver: bool, config: Mapping[str, Any] = {}) -> Callable[[], float]:
     """A timed block of steps of new environments; a first block runs at once, unmeasured."""
-    config = {"solver": {"iterations": ITERATIONS}}
+    config = {**config, "solver": {"iterations": ITERATIONS}}
     env = gym.make_vec(id, num_envs=num_envs, threads=threads, driver=driver, config=config)
     env.reset(seed=0)
     actions = 0.1 * np.random.default_rng(0).normal(size=(num_envs, 2)).clip(-1, 1)

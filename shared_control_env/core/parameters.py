@@ -259,12 +259,12 @@ class PersonParameters(NamedTuple):
         lane_position: smallest error of the lane position that is noticed [m]; assumed: the body is then 0.2 m from
             the line.
         heading: smallest heading relative to the road that is noticed [rad]; assumed.
-        headway: time headway below which the vehicle ahead is noticed [s]; assumed.
+        headway: time headway below which the vehicle ahead is noticed [s]; assumed. With 0 it is not noticed.
         felt_steering: smallest steering angle, felt at the wheel beyond what the road's curvature requires, that is
             noticed [rad]; assumed.
         felt_acceleration: smallest difference between the automation's acceleration and the person's own choice that
             is noticed [m/s^2]; assumed.
-        display: displayed authority alpha_a below which the display is noticed [-]; assumed.
+        display: displayed authority alpha_a below which the display is noticed [-]; assumed. With 0 there is none.
         response: median time from noticing to acting [s]; log-normal over persons, see :data:`PERSONS`.
         response_spread: standard deviation of the logarithm of that time [-].
         arm_noise: standard deviation of the error of a command, divided by the command: signal-dependent noise of the

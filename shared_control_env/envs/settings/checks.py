@@ -325,6 +325,23 @@ def _check_vehicle(settings: Settings) -> None:
         warnings.warn(f"{what}: the car is unstable above it, within the model's range of 40 m/s", stacklevel=2)
 
 
+def _check_thresholds(settings: Settings) -> None:
+    """Check that what a person with resting hands waits for can happen."""
+    road, centre = settings.road, settings.lane_centre(settings.ego.lane)
+    right, left = -0.5 * road.lane_width, settings.lane_centre(road.lanes) - 0.5 * road.lane_width
+    for field, largest, unit, why in (
+        ("lane_position", max(left - centre, centre - right), "m", "beyond it the car is off the road"),
+        ("felt_steering", settings.limits.delta_max, "rad", "the steering angle is never larger"),
+        ("felt_acceleration", 2.0 * settings.limits.a_max, "m/s^2", "two accelerations never differ by more"),
+    ):
+        value = getattr(settings.person, field)
+        if value >= largest:
+            raise ValueError(
+                f"config['person'][{field!r}] = {value} {unit} would never be noticed: it must be less than "
+                f"{largest:g} {unit}, since {why}"
+            )
+
+
 def _check_idle(settings: Settings) -> None:
     """Check that no setting is changed that would have no effect beside the other settings."""
     reason = "the tyres are linear, and know no friction"
@@ -370,6 +387,8 @@ def _check_idle(settings: Settings) -> None:
     for field in ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "response"):
         resting = not person.engaged
         _refuse_idle("config['person']", person, field, resting, "this person drives from the start (engaged)")
+    if person.active and not person.engaged:
+        _check_thresholds(settings)
     law = settings.authority.law
     if settings.fault_at == "planner" and law == "paper":
         raise ValueError(

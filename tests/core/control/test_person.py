@@ -282,3 +282,24 @@ def test_a_person_who_is_drawn_is_not_set_as_well():
         gym.make("SharedControl/TwoLane-v1", config={"persons": ["hands_onn"]})
     with pytest.raises(ValueError, match=r"config\['persons'\] would not act: it needs driver=True"):
         gym.make_vec("SharedControl/TwoLane-v1", num_envs=2, config={"persons": ["hands_on"]})
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "more", "largest"),
+    [
+        ("lane_position", 4.5, {"road": {"lanes": 1}}, "2 m"),
+        ("felt_steering", 0.3, {"limits": {"delta_max": 0.2}}, "0.2 rad"),
+        ("felt_acceleration", 9.0, {"limits": {"a_max": 4.0}}, r"8 m/s\^2"),
+    ],
+)
+def test_a_threshold_that_never_triggers_is_refused(field, value, more, largest):
+    person = {"active": True, "engaged": False, field: value}
+    message = rf"\['person'\]\['{field}'\] = {value}.*never be noticed.*less than {largest}"
+    with pytest.raises(ValueError, match=message):
+        gym.make("SharedControl/Bend-v1", config={"person": person, **more})
+
+
+@pytest.mark.parametrize("field", ["delay", "weber", "response", "arm_noise", "lane_position"])
+def test_negative_numbers_of_a_person_are_refused(field):
+    with pytest.raises(ValueError, match=rf"\['person'\]\['{field}'\] = -0.1.*smallest is"):
+        gym.make("SharedControl/Bend-v1", config={"person": {"active": True, "engaged": False, field: -0.1}})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any, NamedTuple
 
 from shared_control_env.envs.scenarios import DRAWN_V1, SCENARIOS
@@ -22,9 +23,8 @@ _REWARD = {
     "failure": 800.0,
 }
 
-# People leave the lane more often than they collide, and an allocator only chooses how much the person has to do. The
-# weight of the lane is therefore larger, and that of the effort smaller. The weight of a failure is smaller too, since
-# the allocator seldom causes it.
+# An allocator only chooses how much the person has to do. The weight of the lane is therefore larger, and that of the
+# effort smaller. The weight of a failure is smaller too, since the allocator seldom causes it.
 _ALLOCATOR_REWARD = {**_REWARD, "lane": 8.0, "effort": 0.4, "failure": 600.0}
 
 
@@ -85,7 +85,7 @@ def training_config(id: str, task: str) -> dict[str, Any]:
         task: key of :data:`TASKS`.
     """
     return {
-        **TASKS[task].config,
+        **deepcopy(dict(TASKS[task].config)),
         "authority": {"law": "proportional"},
         "faults": [],
         "degradations": list(TRAINED_DEGRADATIONS),

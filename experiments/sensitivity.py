@@ -34,16 +34,13 @@ LAWS = ("paper", "proportional")
 SHOWN = {"two_lane": "lateral_max", "curve": "min_gap"}
 """Metric in each case's picture; the table has all metrics."""
 
-BASE = "as published"
+BASE = "base"
 """Name of the variation that varies nothing."""
 
 PEOPLE = range(40)
 """Seeds of the persons; a person's numbers are means over them."""
 
-NUMBERS_OF_THE_PERSON = (
-    *("delay", "weber", "noise_time", "lane_position", "heading", "headway", "felt_steering", "felt_acceleration"),
-    *("display", "response", "response_spread", "arm_noise"),
-)
+NUMBERS_OF_THE_PERSON = [name for name in PersonParameters._fields if name not in ("active", "engaged", "seed")]
 """Fields of :class:`core.parameters.PersonParameters` that are varied."""
 
 METRICS = ("lateral_max", "min_gap", "authority_min", "driver_effort", "conflict")
@@ -105,7 +102,7 @@ def variations() -> list[Variation]:
         for factor in (0.5, 2.0):
             changed = {name: getattr(weights, name) * factor}
             both = {"automation": changed} if name == "R" else {"automation": changed, "driver": changed}
-            found.append(Variation(f"MPC weight {name}, factor", factor, both))  # R: the driver has no field
+            found.append(Variation(f"MPC weight {name}, factor", factor, both))  # the driver's cost has no R
     for exponent in (0.7, 1.4):
         found.append(Variation("membership breakpoints, exponent", exponent, {}, exponent))
     for gain in (0.8, 1.2):
@@ -156,7 +153,7 @@ def measure(variation: Variation) -> pd.DataFrame:
 
 
 def draw(table: pd.DataFrame, path: Path) -> None:
-    """Draw the range of each case's metric over every parameter, around the published setting.
+    """Draw the range of each case's metric over every parameter, around the base setting.
 
     Args:
         table: results of :func:`measure` for all variations of one driver.
@@ -177,7 +174,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
 
 
 def deviations(table: pd.DataFrame, case: str, law: str) -> tuple[float, pd.DataFrame]:
-    """The published value of a case's metric, and its lowest and highest value over the variations of every parameter.
+    """The base value of a case's metric, and its lowest and highest value over the variations of every parameter.
 
     Args:
         table: results of :func:`measure` for all variations of one driver.
@@ -185,12 +182,12 @@ def deviations(table: pd.DataFrame, case: str, law: str) -> tuple[float, pd.Data
         law: one of :data:`LAWS`.
 
     Returns:
-        The published value, and a table with the columns ``low`` and ``high``.
+        The base value, and a table with the columns ``low`` and ``high``.
     """
     part = table[(table["authority"] == law) & (table["scenario"] == case)].round({SHOWN[case]: 6})
-    published = part["parameter"] == BASE
-    base = float(part.loc[published, SHOWN[case]].iloc[0])
-    groups = part[~published].groupby("parameter", sort=False)[SHOWN[case]]
+    is_base = part["parameter"] == BASE
+    base = float(part.loc[is_base, SHOWN[case]].iloc[0])
+    groups = part[~is_base].groupby("parameter", sort=False)[SHOWN[case]]
     return base, pd.DataFrame({"low": groups.min().clip(upper=base), "high": groups.max().clip(lower=base)})
 
 

@@ -20,13 +20,13 @@ from rich.console import Console
 from scipy import stats
 
 from experiments import style
-from shared_control_env.core.parameters import PERSONS, VehicleParameters, fitted_arms
+from shared_control_env.core.parameters import MOST_LANES, PERSONS, VehicleParameters, fitted_arms
 from shared_control_env.evaluation.episodes import versions
 from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
 
 ONSET = 2.0
-"""Time at which the automation stops to steer [s]."""
+"""Time at which the automation stops steering [s]."""
 
 FIRST_INPUT = np.radians(0.2)
 """Steering angle u_h,act of the person that counts as the first input [rad]: 3 degrees at the wheel, ratio 16."""
@@ -89,7 +89,7 @@ CONDITIONS = [
 
 
 def settings(condition: Condition) -> dict[str, Any]:
-    """Changes to the settings of the motorway: a car that stops to steer, alone on the road, without a limiter.
+    """Changes to the settings of the motorway: a car that stops steering, alone on the road, without a limiter.
 
     The road bends to the right, so that the car drifts into the adjacent lane.
 
@@ -111,6 +111,7 @@ def settings(condition: Condition) -> dict[str, Any]:
         "road": {
             "segments": [{"length": lead}, {"length": length, "curvature": -1.0 / condition.radius}],
             "lane_width": LANE_WIDTH,
+            "lanes": MOST_LANES,  # so wide that nobody is off it before acting
         },
         "ego": {"speed": condition.speed},
         "vehicles": [],
@@ -149,10 +150,11 @@ def simulate(condition: Condition, people: int, seed: int = 0) -> pd.DataFrame:
     for _ in range(round((ONSET + condition.watched) * 20)):
         _, _, terminations, truncations, infos = env.step(None)
         since = infos["t"] - ONSET
-        resting &= ~(infos["driver"]["engaged"] & (since < 0.0))
+        engaged = infos["driver"]["engaged"]
+        resting &= ~(engaged & (since < 0.0))
         error = np.abs(infos["z"][:, 1] - infos["y_target"])
         late = running & (since > 0.0)
-        acted = late & np.isnan(reaction) & (np.abs(infos["u_h_act"][:, 1]) > FIRST_INPUT)
+        acted = late & engaged & np.isnan(reaction) & (np.abs(infos["u_h_act"][:, 1]) > FIRST_INPUT)
         over = late & np.isnan(crossed) & (error > TO_THE_LINE)
         reaction[acted], crossed[over] = since[acted], since[over]
         largest[running] = np.maximum(largest, error)[running]
@@ -169,6 +171,7 @@ class Outcome(NamedTuple):
     Attributes:
         condition: the condition.
         people: number of persons.
+        acting: number of persons who acted at all.
         reaction: mean time to the first steering input of those who acted [s], by bootstrap over persons.
         acted: share of the persons who acted before the body was over the line [-], Wilson's interval.
         kept: share of the persons whose body was never over the line [-], Wilson's interval.
@@ -176,6 +179,7 @@ class Outcome(NamedTuple):
 
     condition: Condition
     people: int
+    acting: int
     reaction: tuple[float, float, float]
     acted: tuple[float, float, float]
     kept: tuple[float, float, float]
@@ -190,7 +194,8 @@ def summarise(condition: Condition, table: pd.DataFrame) -> Outcome:
     """
     before = table["reaction"].notna() & ~(table["crossed"] < table["reaction"])
     reactions = table["reaction"].dropna().to_numpy()
-    return Outcome(condition, len(table), _mean(reactions), _share(before), _share(table["crossed"].isna()))
+    kept = table["crossed"].isna()
+    return Outcome(condition, len(table), len(reactions), _mean(reactions), _share(before), _share(kept))
 
 
 def _mean(values: np.ndarray) -> tuple[float, float, float]:
@@ -217,20 +222,20 @@ def draw(tables: list[pd.DataFrame], path: Path) -> None:
     """
     with style.figure(path, 1, 2, (11.0, 3.8)) as (_, axes):
         for axis, study in zip(axes[0], ("hussain", "paula"), strict=True):
-            for condition, table in zip(CONDITIONS, tables, strict=True):
-                if condition.study != study:
-                    continue
+            shown = [pair for pair in zip(CONDITIONS, tables, strict=True) if pair[0].study == study]
+            radii = sorted({condition.radius for condition, _ in shown})
+            for condition, table in shown:
                 times = np.sort(table["reaction"].dropna())
-                colour = "#1f77b4" if condition.person == "hands_on" else "#d62728"
-                rank = sorted({c.radius for c in CONDITIONS if c.study == study}).index(condition.radius)
+                colour = style.ACTUAL if condition.person == "hands_on" else style.DESIRED
+                rank = radii.index(condition.radius)
                 label = f"{condition.person}, radius {condition.radius:,.0f} m"
                 axis.plot(
                     times, np.arange(1, len(times) + 1) / len(table), ("-", "--", ":")[rank], color=colour, label=label
                 )
                 low, high = condition.published
-                if low == high:
-                    axis.axvline(low, color=colour, lw=3, alpha=0.25)
-                elif condition.person == "hands_on":
+                if rank == 0 and low == high:
+                    axis.axvline(low, color=colour, lw=3, alpha=0.25, label=f"{condition.person}, published mean")
+                elif rank == 0 and condition.person == "hands_on":
                     axis.axvspan(low, high, color="0.5", alpha=0.25, label="published range")
             axis.set(title={"hussain": "Hussain et al., motorway", "paula": "Paula et al., curve"}[study])
             axis.set(xlabel="time from the failure to the first steering input [s]", ylabel="share of the persons [-]")
@@ -249,6 +254,9 @@ def page(outcomes: list[Outcome], people: int) -> str:
     return template.render(
         studies=studies,
         people=people,
+        late=sum(each.reaction[1] > each.condition.published[1] for each in outcomes),
+        early=sum(each.reaction[2] < each.condition.published[0] for each in outcomes),
+        total=len(outcomes),
         first_input=round(float(np.degrees(FIRST_INPUT)), 2),
         lane_width=LANE_WIDTH,
         to_the_line=round(TO_THE_LINE, 3),

@@ -48,7 +48,7 @@ def figure(path: Path, rows: int, columns: int, size: tuple[float, float]) -> It
 
 
 def labels(curves: Mapping[str, np.ndarray], within: float) -> dict[str, str]:
-    """Labels of curves that say which curves lie on one another: ``b (on a)``.
+    """Labels of curves that say which curves lie on one another, until one of them ends: ``b (on a)``.
 
     Args:
         curves: values of every curve by its label, shape (n,); nan where a curve has ended.

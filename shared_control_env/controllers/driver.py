@@ -249,6 +249,11 @@ class PersonDriver(PredictiveDriver):
         self._seen = np.zeros((), SCENE)
         super().__init__(parameters, eps)
 
+    @property
+    def resting(self) -> bool:
+        """Whether the hands rest; the environment then takes u_a,act for u_h,des."""
+        return not self.person["engaged"]
+
     def reset(self, seed: int | None = None) -> None:
         """Begin an episode.
 
@@ -267,6 +272,8 @@ class PersonDriver(PredictiveDriver):
             scene: record of :data:`records.SCENE`, with its safe area already found.
         """
         if scene["k"] > 0:
+            if self.resting:
+                self._last = scene["felt"].copy()  # u_h,des was u_a,act
             self._total = np.clip(scene["felt"] + self._arm, -self._bounds, self._bounds)  # command of the last step
             entries.advance_arm(self._arm, self._last, scene["felt"], self._parameters)
         self._seen[()] = scene
@@ -275,7 +282,6 @@ class PersonDriver(PredictiveDriver):
             self._last = self.solution.command.copy()
             entries.add_arm_noise(self._last, self.person, self._parameters)
         else:
-            self._last = scene["felt"].copy()
             self.solution = Solution(self._last, True, int(osqp.SolverStatus.OSQP_SOLVED), 0, 0.0, 0.0, 0.0)
         return self._last.copy()
 

@@ -165,7 +165,8 @@ def apply_authority(alpha_a: float, e: Environment) -> None:
 def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memory, signals: Signals) -> None:
     """Compute u_h,act (Eq. 16) and the vehicle's command ``u = clip(u_a,act + u_h,act)``.
 
-    The lag advances after u is formed, so u_h,des first has an effect in the next time step.
+    The lag advances after u is formed, so u_h,des first has an effect in the next time step. Hands at rest go along
+    with the automation, u_h,des = u_a,act, so that the arm adds nothing.
 
     Args:
         u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
@@ -176,10 +177,10 @@ def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memor
     """
     for i in range(2):
         bound = p.limits.a_max if i == 0 else p.limits.delta_max
-        signals.u_h_des[i] = u_h_des[i]
+        signals.u_h_des[i] = signals.u_a_act[i] if memory.resting else u_h_des[i]
         signals.u_h_act[i] = memory.u_h_act[i]
         signals.u[i] = min(max(signals.u_a_act[i] + signals.u_h_act[i], -bound), bound)
-        memory.u_h_des[i], memory.u[i], scene.felt[i] = u_h_des[i], signals.u[i], signals.u_a_act[i]
+        memory.u_h_des[i], memory.u[i], scene.felt[i] = signals.u_h_des[i], signals.u[i], signals.u_a_act[i]
     advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
     scene.displayed = signals.alpha_a
 
@@ -266,6 +267,7 @@ def clear_memory(memory: Memory) -> None:
     memory.in_lane = True
     memory.lane_departures = 0
     memory.driver_failures = 0
+    memory.resting = False
 
 
 @jit

@@ -301,9 +301,9 @@ PERSONS: dict[str, PersonParameters] = {
 
 ``attentive``: expects the fault and drives all the time.
 
-``hands_on``: rests the hands on the wheel. With the hands on the wheel, steering reactions at a system limit in a curve
-took 1.18 to 1.74 s (Paula et al., Sensors 23(24):9785, 2023). The median here, 1.2 s, is at the lower end, because the
-time here starts when a quantity passes its threshold, which is later than the fault. The spread is assumed.
+``hands_on``: rests the hands on the wheel. The median response, 1.2 s, and its spread are assumed. The median lies at
+the lower end of the 1.18 to 1.74 s that steering reactions took at a system limit in a curve, where the hands were
+first put on the wheel (Paula et al., Sensors 23(24):9785, 2023): the time here starts when a threshold is passed.
 
 ``hands_off``: feels hardly anything at the wheel and takes 2.7 s, about the mean of 129 studies of take-over times
 (Zhang et al., 2019; the number is yet to be verified). The spread is assumed.

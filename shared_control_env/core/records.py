@@ -221,6 +221,7 @@ class Memory:
         in_lane: whether the ego's centre is in the lane to keep.
         lane_departures: number of times that the ego's centre has left the lane to keep.
         driver_failures: number of steps at which the solver of the kernel's driver failed.
+        resting: whether the driver's hands rest on the wheel, or are off it: u_h,des is then u_a,act.
     """
 
     u_h_act: Vector2
@@ -230,6 +231,7 @@ class Memory:
     in_lane: bool
     lane_departures: Int32
     driver_failures: Int32
+    resting: bool
 
 
 class PersonMemory:

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.core.faults.kinds import KINDS
-from shared_control_env.core.parameters import PERSONS, Limits
+from shared_control_env.core.parameters import PERSONS, Limits, PersonParameters
 from shared_control_env.envs.degradations import draw_degradation
 from shared_control_env.envs.settings import CUT_OFF, RandomSettings, Settings, check, plain
 from shared_control_env.envs.settings.changes import at
+from shared_control_env.envs.settings.checks import RESTING
 
 
 def is_random(settings: Settings) -> bool:
@@ -52,6 +53,9 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
         config["person"], config["persons"] = {**person._asdict(), "seed": settings.person.seed}, []
     for entry in settings.randomise:
         _draw_setting(config, entry, own if _concerns_driver(entry) else rng)
+    if settings.persons and config["person"]["engaged"]:
+        attentive = PersonParameters()._asdict()  # what only resting hands wait for does not concern this person
+        config["person"].update({name: attentive[name] for name in RESTING})
     drawn: list[dict[str, Any]] = []
     if settings.degradations:
         name = settings.degradations[int(rng.integers(len(settings.degradations)))]

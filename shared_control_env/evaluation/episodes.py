@@ -217,6 +217,7 @@ class Recorder:
         crashed, left_road: whether each episode ended in a collision, or off the road, shape (n,).
         failures: number of solver failures of each episode, shape (n,).
         noticed: time at which a person at rest noticed something [s], nan if never, shape (n,).
+        response: time from noticing to acting of a person at rest [s], 0 for other drivers, shape (n,).
     """
 
     SIGNALS = ("z", "y_target", "v_target", "u", "u_h_act", "u_a_act", "alpha_a", "neighbours", "fault_active")
@@ -226,7 +227,7 @@ class Recorder:
         self._shape = (steps, n)
         self.lengths = np.full(n, steps)
         self.crashed, self.left_road = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-        self.failures, self.noticed = np.zeros(n, dtype=int), np.full(n, np.nan)
+        self.failures, self.noticed, self.response = np.zeros(n, dtype=int), np.full(n, np.nan), np.zeros(n)
         self._running = np.ones(n, dtype=bool)
 
     def note(self, k: int, infos: Mapping[str, Any], ended: np.ndarray) -> bool:
@@ -248,6 +249,7 @@ class Recorder:
         failures = infos["automation"]["failures"] + (infos["driver"]["failures"] if "driver" in infos else 0)
         self.failures[self._running] = failures[self._running]
         if "driver" in infos:
+            self.response[self._running] = infos["driver"]["response"][self._running]
             noticed = infos["driver"]["noticed"]
             seen = self._running & np.isfinite(noticed)
             self.noticed[seen] = noticed[seen]
@@ -348,8 +350,8 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
         frames: list to which pictures of all episodes before each step are appended; None for no pictures.
 
     Returns:
-        One row per episode: identity, end, the driver's K_h [-] and T_h [s], the person at the wheel, the time at which
-        a person at rest noticed something [s], all metrics, and the versions.
+        One row per episode: identity, end, the driver's K_h [-] and T_h [s], the person at the wheel, with the response
+        time and the time at which a person at rest noticed something [s], all metrics, and the versions.
     """
     begin = perf_counter()
     env = make_environment(batch, None if frames is None else "rgb_array")
@@ -381,6 +383,7 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
             "duration": recorder.lengths[i] / drawn[i].policy_frequency,
             **plain(drawn[i])["driver_lag"],
             "person": person_of(drawn[i]),
+            "response": recorder.response[i],
             "noticed": recorder.noticed[i],
             **measure_all(recorder.trajectory(i, drawn[i], wall_time)),
             "config_hash": config_hash(batch.scenario, configs[i]),
@@ -393,6 +396,8 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
 
 def person_of(settings: Settings) -> str:
     """Name of the person at the wheel: a key of :data:`core.parameters.PERSONS`, ``own``, or empty without a person.
+
+    The delay of perception, which differs between the persons of a population, does not count.
 
     Args:
         settings: settings of one episode.

@@ -110,6 +110,7 @@ IDENTITY = (
         "K_h",
         "T_h",
         "person",
+        "response",
         "noticed",
     ),
     *("config_hash", "version", "versions"),

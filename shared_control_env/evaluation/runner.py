@@ -81,8 +81,9 @@ def evaluate(
 
     Returns:
         One row per episode: scenario, degradation, driver, authority, seed, whether it was terminated, its
-        duration [s], the driver's K_h [-] and T_h [s], the person at the wheel, the time at which that person noticed
-        something [s], every metric of :data:`metrics.METRICS`, the digest of its settings, and the versions.
+        duration [s], the driver's K_h [-] and T_h [s], the person at the wheel, the response time and the time at
+        which that person noticed something [s], every metric of :data:`metrics.METRICS`, the digest of its settings,
+        and the versions.
 
     Raises:
         ValueError: for unknown names, with the nearest and all valid ones; for an entry that does not make a driver or

@@ -85,7 +85,9 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         """The driver's command divided by its limits, shape (2,)."""
         shared = self.shared
         if self._given is None:
-            return checked_command(self.driver.act(shared.observation, shared.scene)) / shared.command_limits
+            command = checked_command(self.driver.act(shared.observation, shared.scene))
+            shared.memory["resting"] = isinstance(self.driver, PersonDriver) and self.driver.resting
+            return command / shared.command_limits
         # Copies, so that a user's driver cannot change the simulation.
         command = checked_command(self.driver.act(shared.observation.copy(), shared.scene.copy()))
         return np.clip(command / shared.command_limits, -1.0, 1.0)

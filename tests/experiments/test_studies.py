@@ -11,8 +11,8 @@ QUICK = studies.Condition("paula", "hands_on", 22.2, 300.0, (1.18, 1.74))
 
 
 def test_a_car_that_nobody_steers_is_over_the_line_when_the_drift_says_so(monkeypatch):
-    """Hands off, and nothing that could be noticed: the time of the parabola, but for the yaw that dies out first."""
-    monkeypatch.setitem(PERSONS, "hands_off", PERSONS["hands_off"]._replace(lane_position=5.0, heading=0.5))
+    """Hands off for 30 s: the time of the parabola, but for the yaw that dies out first. Nobody counts as acting."""
+    monkeypatch.setitem(PERSONS, "hands_off", PERSONS["hands_off"]._replace(response=30.0, response_spread=0.0))
     condition = QUICK._replace(person="hands_off")
     table = studies.simulate(condition, 4)
     assert table["reaction"].isna().all()
@@ -27,6 +27,9 @@ def test_who_acts_acts_after_noticing_and_less_late_on_the_wheel():
     }
     times = {name: table["reaction"].mean() for name, table in tables.items()}
     assert 0.5 < times["hands_on"] < times["hands_off"]
+    for table in tables.values():
+        assert table["reaction"].notna().mean() > 0.9  # the road is wide enough to act on
+        assert table["reaction"].min() > 0.3  # nobody acts before having noticed
     again = studies.simulate(QUICK._replace(radius=1000.0), 40)
     np.testing.assert_array_equal(again["reaction"], tables["hands_on"]["reaction"])
 
@@ -53,7 +56,8 @@ def test_the_page_has_the_numbers_of_its_run(tmp_path):
     assert "with 12 persons" in page
     assert page.count("| `hands_on` |") == page.count("| `hands_off` |") == 6
     outcome = studies.summarise(studies.CONDITIONS[0], studies.simulate(studies.CONDITIONS[0], 12))
-    assert "| 3 | `hands_on` | 3.7 | {:.1f} ({:.1f} to {:.1f}) | 100 |".format(*outcome.reaction) in page
+    assert f"| 3 | `hands_on` | {outcome.acting} of 12 | 3.7 | " in page
+    assert "| 3.7 | {:.1f} ({:.1f} to {:.1f}) | 100 |".format(*outcome.reaction) in page
     assert (tmp_path / "studies.png").stat().st_size > 20_000
 
 

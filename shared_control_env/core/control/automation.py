@@ -2,6 +2,11 @@
 
 The cost is a sum of squares. Each iteration linearises the residuals along the rollout of the implicit model, solves
 the quadratic program with box bounds for a step, and makes a line search along the step.
+
+A stage of the horizon is one implicit step, which damps the yaw rate more than the plant's finer steps do. With the
+plant's steps as model, the first steering command off the centre of the lane is 13 % smaller at 8 and 15 m/s, and 39 %
+larger at 25 m/s. In closed loop the difference is small: after a lane error of 1 m the overshoot is 0.19 m, not 0.22 m,
+at 15 m/s, and 0.99 m, not 0.86 m, at 25 m/s; the car settles 0.1 to 0.25 s earlier.
 """
 
 from __future__ import annotations

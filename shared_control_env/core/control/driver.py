@@ -13,7 +13,7 @@ penalty. Two slacks, since a car that cannot stop before the end of C must still
            -1 <= U / bound <= 1,   eps >= 0,   eta >= 0
 
 Eq. 15 keeps the predicted (x, y) in C. C ends at the clearance d_o behind the preceding vehicle, which the row of s
-keeps. That row is for the last stage alone, since s(i) does not decrease.
+keeps. That row is for the last stage alone, which is the farthest while the car drives forwards.
 
 The paper's driver assumes that its desired command drives the car. It knows neither its own lag nor the automation's
 command. The internal model adds both to the program; the variables are still u_h,des::

@@ -156,7 +156,7 @@ def perceive_and_attend(scene: Scene, u_last: np.ndarray, memory: PersonMemory, 
         seen: copy of the scene, record of :data:`records.SCENE`; changed to the perceived scene.
 
     Returns:
-        Whether the person drives. If not, the hands rest, and u_h,des is the command of the automation as felt.
+        Whether the person drives. If not, the hands rest, and u_h,des is u_a,act.
     """
     if scene.k == 0:
         clear_person(memory, p)

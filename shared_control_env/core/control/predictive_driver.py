@@ -101,13 +101,13 @@ def drive(
 ) -> None:
     """Compute the command of the predictive driver (Eq. 15) or of a person, and write it to ``program.command``.
 
-    Resting hands follow the command of the automation that they feel. If the solver fails, the last command is held
-    and the failure is counted.
+    Hands at rest command nothing; the loop then takes u_a,act for u_h,des. If the solver fails, the last command is
+    held and the failure is counted.
 
     Args:
         scene: record of :data:`records.SCENE`.
         p: parameters.
-        memory: record of :data:`records.MEMORY`; failures are counted in it.
+        memory: record of :data:`records.MEMORY`; ``resting`` is written, and failures are counted.
         person: record of :data:`records.PERSON_MEMORY`, updated if the driver is a person.
         work: record of :data:`condensing.WORKSPACE`.
         program: record of :data:`PROGRAM`, written.
@@ -123,9 +123,9 @@ def drive(
         _solve(program.seen, p, memory, work, program, report)
         add_arm_noise(program.command, person, p)
     else:
-        program.command[0], program.command[1] = scene.felt[0], scene.felt[1]
         report.status, report.iterations, report.failures = SOLVED, 0, memory.driver_failures
         report.primal_residual, report.dual_residual = 0.0, 0.0
+    memory.resting = not person.engaged
     report.engaged, report.noticed, report.reason = person.engaged, person.noticed, person.reason
     report.response = person.response
 

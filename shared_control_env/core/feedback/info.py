@@ -71,7 +71,8 @@ class Info:
         fault_active: whether any degradation has set in; ground truth.
         automation: outcome of the automation's solver.
         speed: v_x after the step [m/s].
-        u_realised: what the car's actuators have made of the commands u; u itself without lag and rate limit.
+        u_realised: output of the car's actuators under the commands u; u itself without lag and rate limit. Tyres that
+            slide may transmit less of it.
         crashed: whether the ego has collided, after the step.
         on_road: whether the ego's centre lies between the edges of the road, after the step.
         in_lane: whether the ego's centre is in the lane to keep, after the step.
@@ -159,7 +160,6 @@ def note_outcome(speed: float, transition: Transition, memory: Memory, info: Inf
 
     Args:
         speed: v_x after the step [m/s].
-        u_realised: what the car's actuators have made of the commands u; u itself without lag and rate limit.
         transition: record of :data:`records.TRANSITION` after the step.
         memory: record of :data:`records.MEMORY`.
         info: record of :data:`INFO`, written from ``speed`` on.

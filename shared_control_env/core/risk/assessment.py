@@ -36,7 +36,7 @@ def predict_ego(scene: Scene, u_f: np.ndarray, line: np.ndarray, p: Parameters, 
 
     The prediction starts from the present pose and speed. Its yaw rate is that of the dynamic model after one step
     under u_a,f, integrated as the plant is: one implicit step of the controllers has a yaw rate 14 to 24 % lower, so
-    that alpha_a would oscillate.
+    that alpha_a would oscillate. Lag and rate limit of the actuators are unknown to the assessment.
 
     Readings of "in the road frame" on a curve: the tangent frame at the ego, or the curvilinear frame. The tangent
     departs from the road by x^2 / 2R (0.3 m in Case 2), which would itself count as risk. The prediction therefore

@@ -5,6 +5,9 @@ heading relative to the path [rad], longitudinal and lateral velocity in the bod
 ``kappa = 0`` the path is a straight line and ``[s, y, psi]`` is Eq. 11's ``[x, y, psi]``. The plant runs in the
 Cartesian frame with kappa = 0, the predictive controllers run in the road frame.
 Axes follow ISO 8855: x forward, y to the left, positive steering and yaw rate turn left.
+
+The speed v_x does not fall below 0. A car that spins past 90 deg against its path is therefore outside the model: v_x
+is then held at 0. Such episodes nearly always end off the road.
 """
 
 from __future__ import annotations

@@ -26,6 +26,9 @@ LARGEST_OFFSET = 20.0
 CUT_OFF = 3.0
 """Number of standard deviations at which log-normal draws are cut off [-]."""
 
+RESTING = ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "response")
+"""Settings of a person that act only where the hands rest at the start."""
+
 WAYS_TO_DRAW = ({"low", "high"}, {"median", "spread"}, {"choices"})
 """Keys that an entry of ``randomise`` has beside ``setting``: one of these sets."""
 
@@ -222,9 +225,23 @@ def _check_random(settings: Settings) -> None:
             raise ValueError(f"{name} = {given} must have either low <= high, or median and spread, or choices")
         for value in ends_of(entry):
             try:
-                _validated(assigned(config, path, value))
+                drawn = _validated(assigned(config, path, value))
             except ValueError as error:
                 raise ValueError(f"{name} draws a value that is not allowed: {error}") from None
+            _check_drawn(name, entry, drawn, settings)
+
+
+def _check_drawn(name: str, entry: RandomSettings, drawn: Settings, settings: Settings) -> None:
+    """Check that an end of a draw acts beside the other settings, unless another entry draws its own section too."""
+    section = entry.setting.split(".")[0]
+    if any(each.setting.split(".")[0] == section for each in settings.randomise if each is not entry):
+        return
+    if section == "person" and settings.persons:
+        return
+    try:
+        _check_idle(drawn)
+    except ValueError as error:
+        raise ValueError(f"{name} draws {entry.setting!r}: {error}") from None
 
 
 def ends_of(entry: RandomSettings) -> tuple[float, ...]:
@@ -335,7 +352,8 @@ def _check_thresholds(settings: Settings) -> None:
         ("felt_acceleration", 2.0 * settings.limits.a_max, "m/s^2", "two accelerations never differ by more"),
     ):
         value = getattr(settings.person, field)
-        if value >= largest:
+        preset = any(value == getattr(each, field) for each in core.PERSONS.values())
+        if value >= largest and not preset:  # a preset may have a threshold that these limits never reach
             raise ValueError(
                 f"config['person'][{field!r}] = {value} {unit} would never be noticed: it must be less than "
                 f"{largest:g} {unit}, since {why}"
@@ -384,8 +402,8 @@ def _check_idle(settings: Settings) -> None:
         raise ValueError(f"config['person']['delay'] = {person.delay} s must lie in [0, {longest:g}] at this frequency")
     for field in type(person).model_fields:
         _refuse_idle("config['person']", person, field, field == "active" or settings.has_person, "there is no person")
-    for field in ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "response"):
-        resting = not person.engaged
+    for field in RESTING:
+        resting = not person.engaged or bool(settings.persons)
         _refuse_idle("config['person']", person, field, resting, "this person drives from the start (engaged)")
     if person.active and not person.engaged:
         _check_thresholds(settings)

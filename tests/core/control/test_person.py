@@ -188,16 +188,24 @@ def test_the_person_in_the_kernel_is_the_one_from_python(name, person):
         done = terminated or truncated
 
 
-def test_hands_that_rest_do_nothing():
-    config = {**CONFIG, "person": {"active": True, "engaged": False}, "faults": []}
-    env = gym.make_vec("SharedControl/TwoLane-v1", num_envs=1, driver=True, config=config)
+@pytest.mark.parametrize("kernel", [False, True])
+def test_hands_that_rest_do_nothing(kernel):
+    """Not even where the automation's command jumps: u_h,des is the u_a,act of the same step."""
+    person = {"active": True, "engaged": False, "response": 30.0, "response_spread": 0.0}
+    fault = {"channel": "steering", "onset": 0.5, "size": 0.3}
+    config = {**CONFIG, "person": person, "faults": [fault], "authority": {"law": "none"}, "duration": 1.5}
+    if kernel:
+        env = gym.make_vec("SharedControl/TwoLane-v1", num_envs=1, driver=True, config=config)
+    else:
+        env = DriverModel(gym.make("SharedControl/TwoLane-v1", config=config))
     env.reset(seed=0)
-    for _ in range(60):
-        infos = env.step(None)[4]
-        assert not infos["driver"]["engaged"][0]
-        felt = env.unwrapped.scenes["felt"][0]
-        np.testing.assert_allclose(infos["u_a_act"][0], felt)
-    np.testing.assert_allclose(infos["u_h_act"][0], 0.0, atol=0.05)
+    for _ in range(25):
+        infos = env.step(None if kernel else 0)[4]
+        assert not np.any(infos["driver"]["engaged"])
+        np.testing.assert_array_equal(infos["u_h_des"], infos["u_a_act"])
+        np.testing.assert_array_equal(infos["u_h_act"], 0.0 * infos["u_h_act"])
+        np.testing.assert_array_equal(infos["u"], infos["u_a_act"])
+    assert np.abs(infos["u"]).max() > 0.25
 
 
 def test_persons_are_drawn_from_the_environments_generator():
@@ -303,3 +311,26 @@ def test_a_threshold_that_never_triggers_is_refused(field, value, more, largest)
 def test_negative_numbers_of_a_person_are_refused(field):
     with pytest.raises(ValueError, match=rf"\['person'\]\['{field}'\] = -0.1.*smallest is"):
         gym.make("SharedControl/Bend-v1", config={"person": {"active": True, "engaged": False, field: -0.1}})
+
+
+def test_what_is_drawn_beside_persons_is_taken_at_every_reset():
+    """Also where the person drawn drives from the start, and where a preset's threshold is beyond the limits."""
+    draws = [{"setting": f"person.{name}", "low": 0.1, "high": 0.3} for name in ("display", "headway", "delay")]
+    config = {"persons": list(PERSONS), "randomise": draws, "limits": {"delta_max": 0.4}}
+    env = DriverModel(gym.make("SharedControl/TwoLane-v1", config=config))
+    seen = set()
+    for seed in range(12):
+        env.reset(seed=seed)
+        person = env.unwrapped.episode.person
+        assert 0.1 <= person.delay <= 0.3
+        assert person.engaged == (person.display == PERSONS["attentive"].display)
+        seen.add(person.engaged)
+    assert seen == {False, True}
+
+
+@pytest.mark.parametrize("path", ["vehicle.mu", "model.mu", "person.delay"])
+def test_a_draw_that_would_not_act_is_refused_when_the_environment_is_made(path):
+    draw = {"setting": path, "low": 0.15, "high": 0.25}
+    for make in (gym.make, lambda *a, **k: gym.make_vec(*a, num_envs=2, **k)):
+        with pytest.raises(ValueError, match=rf"\['randomise'\]\[0\] draws '{path}': .*would not act"):
+            make("SharedControl/TwoLane-v1", config={"randomise": [draw]})

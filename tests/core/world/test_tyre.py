@@ -105,17 +105,24 @@ def test_the_plant_converges_with_second_order():
 
 @pytest.mark.parametrize("mu", [0.3, 0.5, 0.9])
 def test_no_command_accelerates_the_car_more_than_the_road_allows(mu):
-    """Full steering back and forth with full braking or acceleration: the force per mass stays within mu g."""
-    car, rng, work = CAR._replace(mu=mu), np.random.default_rng(0), np.zeros((2, 6))
-    for _ in range(40):
+    """Full steering held for half a second each, with full braking or acceleration, until the car spins past 90 deg.
+
+    The force per mass, averaged over a step of the environment, stays within mu g, and comes near it.
+    """
+    car, rng, work, largest = CAR._replace(mu=mu), np.random.default_rng(0), np.zeros((2, 6)), 0.0
+    for _ in range(200):
         z = np.array([0.0, 0.0, 0.0, rng.uniform(5.0, 35.0), 0.0, 0.0])
-        for _ in range(60):
+        for k in range(40):
+            if k % 10 == 0:
+                a, delta = rng.uniform(-5.0, 5.0), rng.choice([-0.5, 0.5])
             before = z.copy()
-            a, delta = rng.uniform(-5.0, 5.0), rng.uniform(-0.5, 0.5)
-            dynamics.plant_step(z, a, delta, 0.001, car, work)
-            lateral = (z[4] - before[4]) / 0.001 + 0.5 * (before[3] * before[5] + z[3] * z[5])
-            longitudinal = (z[3] - before[3]) / 0.001 - 0.5 * (before[4] * before[5] + z[4] * z[5])
-            assert np.hypot(lateral, longitudinal) <= 1.02 * mu * G
+            dynamics.plant_step(z, a, delta, 0.05, car, work)
+            if z[3] < 1.0:
+                break
+            lateral = (z[4] - before[4]) / 0.05 + 0.5 * (before[3] * before[5] + z[3] * z[5])
+            longitudinal = (z[3] - before[3]) / 0.05 - 0.5 * (before[4] * before[5] + z[4] * z[5])
+            largest = max(largest, np.hypot(lateral, longitudinal))
+    assert 0.95 * mu * G < largest <= 1.1 * mu * G
 
 
 def test_braking_takes_grip_from_the_steering():

@@ -29,6 +29,7 @@ from agents.train import BEST, PROGRESS, Training
 from experiments import style
 from shared_control_env.evaluation import SUITES
 from shared_control_env.evaluation.engines import worker_pool
+from shared_control_env.evaluation.episodes import versions
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
@@ -190,6 +191,7 @@ def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
         "description": TASKS[task].description,
         "reward": ", ".join(f"{name} {value:g}" for name, value in TASKS[task].reward.items()),
         "draws": ", ".join(in_words(draw) for draw in TASKS[task].draws),
+        "versions": states[0]["card"]["versions"],
         "asked": STEPS[task],
         "steps": f"{states[0]['steps']:,}",
         "fastest": round(min(seconds)),
@@ -212,12 +214,11 @@ def card(tables: dict[str, pd.DataFrame], jobs: int) -> str:
         jobs: number of trainings at once.
     """
     template = Template(Path(__file__).with_suffix(".md.j2").read_text(), keep_trailing_newline=True)
-    versions = state_of("driver", 0)["card"]["versions"]
     return template.render(
         ids=IDS,
         scenarios=len(SCENARIOS),
         seeds=list(SEEDS),
-        versions=versions,
+        versions=versions(),
         jobs=jobs,
         cores=os.cpu_count(),
         dead_zone=round(100.0 * DEAD_ZONE),

@@ -9,11 +9,12 @@ penalty. Two slacks, since a car that cannot stop before the end of C must still
 ::
 
     min  x^T P x / 2 + q^T x      subject to   low <= A x <= high,    x = [U / bound, eps, eta]
-    rows:  y(i) - eps <= upper(i),   y(i) + eps >= lower(i),   s(H_p) - eta <= end,
+    rows:  y(i) - eps <= upper(i),   y(i) + eps >= lower(i),   s(H_p) + l / 2 - eta <= end,
            -1 <= U / bound <= 1,   eps >= 0,   eta >= 0
 
-Eq. 15 keeps the predicted (x, y) in C. C ends at the clearance d_o behind the preceding vehicle, which the row of s
-keeps. That row is for the last stage alone, which is the farthest while the car drives forwards.
+Eq. 15 keeps the predicted (x, y) in C, which ends at the clearance d_o behind the preceding vehicle. Readings: the
+car's centre, or its front. With the centre the car would already touch the other, so the row of s keeps the front,
+half the car's length l ahead. That row is for the last stage alone, the farthest while the car drives forwards.
 
 The paper's driver assumes that its desired command drives the car. It knows neither its own lag nor the automation's
 command. The internal model adds both to the program; the variables are still u_h,des::
@@ -217,7 +218,7 @@ def build_program(
     for c in range(n):
         A[first, c] = sens[S, c] * (p.limits.a_max if c % 2 == 0 else p.limits.delta_max)
     A[first, n + 1] = -1.0
-    low[first], high[first] = -UNBOUNDED, scene.area.end - z[S]
+    low[first], high[first] = -UNBOUNDED, scene.area.end - 0.5 * p.model.length - z[S]
     first += 1
     if internal:
         for c in range(n):

@@ -90,7 +90,7 @@ def test_cost_and_rows_are_those_of_the_rollout(active, horizons, seed):
         np.testing.assert_allclose(rows[H_p : 2 * H_p], moved + x[n], atol=1e-10)
         np.testing.assert_allclose(rows[-n - SLACKS :], x)
         assert rows[2 * H_p] == pytest.approx(states[-1, 0] - at_zero[-1, 0] - x[n + 1], abs=1e-9)
-        assert high[2 * H_p] == pytest.approx(float(scene["area"]["end"]) - at_zero[-1, 0], abs=1e-9)
+        assert high[2 * H_p] == pytest.approx(float(scene["area"]["end"]) - 2.5 - at_zero[-1, 0], abs=1e-9)
 
 
 def test_without_the_internal_model_the_arm_and_what_is_felt_do_not_matter():
@@ -108,7 +108,7 @@ def test_the_driver_brakes_for_the_end_of_the_safe_area(active):
     """Eq. 15 keeps (x, y) in C: with 1 m of free road the driver brakes as hard as it can, with 55 m not at all."""
     parameters = Parameters(internal_model=InternalModelParameters(active))
     commands = []
-    for free in (1.0, 5.0, 55.0):
+    for free in (1.0, 9.0, 55.0):
         driver = PredictiveDriver(parameters)
         scene = scene_of(np.array([0.0, 0.0, 0.0, 15.0, 0.0, 0.0]), pack(parameters))
         scene["area"]["end"] = free

@@ -377,6 +377,7 @@ def test_highway_env_is_imported_without_pandas_and_pyplot_which_work_all_the_sa
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.filterwarnings("ignore:.*is out of date")
 def test_the_version_before_names_this_one(name):
-    with pytest.raises(gym.error.Error, match=name):
+    with pytest.raises(gym.error.DeprecatedEnv, match=f"Please use `{name}` instead"):
         gym.make(name.replace("-v1", "-v0"))

@@ -56,11 +56,11 @@ def check(config: Mapping[str, Any]) -> Settings:
     settings = _validated(config)
     _check_time(settings)
     _check_faults(settings)
-    _check_random(settings)
     _check_road(settings)
     _check_places(settings)
     _check_vehicle(settings)
     _check_idle(settings)
+    _check_random(settings)  # last, so that what it finds is due to a draw
     return settings
 
 

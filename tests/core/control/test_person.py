@@ -334,3 +334,9 @@ def test_a_draw_that_would_not_act_is_refused_when_the_environment_is_made(path)
     for make in (gym.make, lambda *a, **k: gym.make_vec(*a, num_envs=2, **k)):
         with pytest.raises(ValueError, match=rf"\['randomise'\]\[0\] draws '{path}': .*would not act"):
             make("SharedControl/TwoLane-v1", config={"randomise": [draw]})
+
+
+def test_what_a_setting_does_wrong_is_not_blamed_on_a_draw():
+    config = {"longitudinal_risk": {"sigma_x": 3.0}, "randomise": [{"setting": "ego.speed", "low": 12.0, "high": 14.0}]}
+    with pytest.raises(ValueError, match=r"^config\['longitudinal_risk'\]\['sigma_x'\] = 3.0 would not act"):
+        gym.make("SharedControl/LaneKeeping-v1", config=config)

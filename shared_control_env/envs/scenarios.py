@@ -273,7 +273,7 @@ WET_ROAD = Scenario(
         **ON_THE_ROAD,
         "road": _BEND_ROAD,
         "ego": {"speed": 11.0},
-        "vehicle": {"tyre": "fiala", "mu": 0.5},
+        "vehicle": {**ON_THE_ROAD["vehicle"], "mu": 0.5},
         "vehicles": [{"lane": 0, "position": 25.0, "speed": 10.0}],
         "screen_height": 632,
         "randomise": [
@@ -294,7 +294,7 @@ MOTORWAY = Scenario(
         **ON_THE_ROAD,
         "road": {"segments": [{"length": 50.0, "curvature": 0.0}, {"length": 450.0, "curvature": 1.0 / 1000.0}]},
         "ego": {"speed": 29.0},
-        "task": {"time_headway": 1.2, "target_speed": 29.0},
+        "task": {**ON_THE_ROAD["task"], "target_speed": 29.0},
         "vehicles": [
             {"lane": 0, "position": 80.0, "speed": 26.0},
             {"lane": 1, "position": 50.0, "speed": 31.0},

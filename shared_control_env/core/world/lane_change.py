@@ -6,23 +6,31 @@ from shared_control_env.core.compile.jit import jit
 
 
 @jit
-def change_progress(t: float, onset: float, duration: float) -> float:
-    """Completed share of a lane change: the minimum-jerk course between two points at rest.
-
-    ``10 tau^3 - 15 tau^4 + 6 tau^5`` with ``tau = (t - onset) / duration`` (Flash & Hogan, The Coordination of Arm
-    Movements, J. Neuroscience 1985, Eq. 3).
+def elapsed_share(t: float, onset: float, duration: float) -> float:
+    """Share of the duration of a lane change that has passed, in [0, 1] [-].
 
     Args:
         t: time [s].
         onset: time at which the lane change begins [s]; infinite for none.
         duration: duration of the lane change [s].
+    """
+    return min(max((t - onset) / duration, 0.0), 1.0)
+
+
+@jit
+def change_progress(t: float, onset: float, duration: float) -> float:
+    """Completed share of a lane change: the minimum-jerk course between two points at rest.
+
+    ``10 tau^3 - 15 tau^4 + 6 tau^5`` with the elapsed share tau (Flash & Hogan, The Coordination of Arm Movements,
+    J. Neuroscience 1985, Eq. 3).
+
+    Args:
+        t, onset, duration: as in :func:`elapsed_share`.
 
     Returns:
         Share in [0, 1] [-].
     """
-    if t <= onset:
-        return 0.0
-    tau = min((t - onset) / duration, 1.0)
+    tau = elapsed_share(t, onset, duration)
     return tau * tau * tau * (10.0 + tau * (6.0 * tau - 15.0))
 
 
@@ -35,15 +43,11 @@ def change_weight(t: float, onset: float, duration: float) -> float:
     ``3 x^2 - 2 x^3`` in the share x of the quarter.
 
     Args:
-        t: time [s].
-        onset: time at which the lane change begins [s]; infinite for none.
-        duration: duration of the lane change [s].
+        t, onset, duration: as in :func:`elapsed_share`.
 
     Returns:
         Share in [0, 1] [-].
     """
-    if t <= onset or t >= onset + duration:
-        return 0.0
-    tau = (t - onset) / duration
+    tau = elapsed_share(t, onset, duration)
     x = min(4.0 * min(tau, 1.0 - tau), 1.0)
     return x * x * (3.0 - 2.0 * x)

@@ -20,7 +20,8 @@ from rich.console import Console
 from scipy import stats
 
 from experiments import style
-from shared_control_env.core.parameters import MOST_LANES, PERSONS, VehicleParameters, fitted_arms
+from shared_control_env.core.parameters import MOST_LANES, PERSONS, VehicleParameters
+from shared_control_env.evaluation import DRIVERS
 from shared_control_env.evaluation.episodes import versions
 from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
@@ -91,19 +92,14 @@ CONDITIONS = [
 def settings(condition: Condition) -> dict[str, Any]:
     """Changes to the settings of the motorway: a car that stops steering, alone on the road, without a limiter.
 
-    The road bends to the right, so that the car drifts into the adjacent lane.
-
-    The cars of the studies showed nothing about the authority, so the person does not see alpha_a.
+    The road bends to the right, so that the car drifts into the adjacent lane. The cars of the studies did not display
+    alpha_a, so the person does not see it.
 
     Args:
         condition: the condition.
     """
     lead = 0.5 * condition.speed
     duration = ONSET + condition.watched
-    arms = [
-        {"setting": f"driver_lag.{name}", "median": median, "spread": spread}
-        for name, (median, spread) in zip(("K_h", "T_h"), fitted_arms(), strict=True)
-    ]
     person = {**PERSONS[condition.person]._asdict(), "display": 0.0, "seed": None}
     length = min(condition.speed * (duration + 2.0), 1.9 * np.pi * condition.radius)
     return {
@@ -121,7 +117,7 @@ def settings(condition: Condition) -> dict[str, Any]:
         "faults": [{"kind": "drop_out", "channel": "steering", "onset": ONSET}],
         "internal_model": {"active": True},
         "person": person,
-        "randomise": [*arms, {"setting": "person.delay", "low": 0.15, "high": 0.25}],
+        "randomise": list(DRIVERS["population"].draws),
     }
 
 
@@ -136,7 +132,7 @@ def simulate(condition: Condition, people: int, seed: int = 0) -> pd.DataFrame:
     Returns:
         One row per person who was at rest when the failure came. ``reaction``: time from the failure to the first
         steering input [s], nan without one; ``crossed``: time from the failure until the body was over the line [s],
-        nan if it never was; ``largest``: largest lateral error [m].
+        nan if it never was.
     """
     env = gym.make_vec(
         "SharedControl/Motorway-v1",
@@ -145,9 +141,9 @@ def simulate(condition: Condition, people: int, seed: int = 0) -> pd.DataFrame:
         config=settings(condition),
     )
     env.reset(seed=seed)  # Gymnasium counts on from it
-    reaction, crossed, largest = np.full(people, np.nan), np.full(people, np.nan), np.zeros(people)
+    reaction, crossed = np.full(people, np.nan), np.full(people, np.nan)
     running, resting = np.ones(people, dtype=bool), np.ones(people, dtype=bool)
-    for _ in range(round((ONSET + condition.watched) * 20)):
+    for _ in range(env.unwrapped.episodes[0].steps):  # type: ignore[attr-defined]
         _, _, terminations, truncations, infos = env.step(None)
         since = infos["t"] - ONSET
         engaged = infos["driver"]["engaged"]
@@ -157,12 +153,11 @@ def simulate(condition: Condition, people: int, seed: int = 0) -> pd.DataFrame:
         acted = late & engaged & np.isnan(reaction) & (np.abs(infos["u_h_act"][:, 1]) > FIRST_INPUT)
         over = late & np.isnan(crossed) & (error > TO_THE_LINE)
         reaction[acted], crossed[over] = since[acted], since[over]
-        largest[running] = np.maximum(largest, error)[running]
         running &= ~(terminations | truncations)
         if not running.any():
             break
     env.close()
-    return pd.DataFrame({"reaction": reaction, "crossed": crossed, "largest": largest})[resting]
+    return pd.DataFrame({"reaction": reaction, "crossed": crossed})[resting]
 
 
 class Outcome(NamedTuple):

@@ -82,9 +82,8 @@ def _vectors(report: Callable[..., None], peer: Timing, single: Timing, repeats:
         one = vectors.kernel(256, False, max(3, repeats // 5), id).one
         what = f"kernel, N = 256, {id.removeprefix('SharedControl/')}, 1 core, draws of episodes included"
         report(what, str(one), f"{1.0 / one.median:,.0f}/s", "")
-    for what, (config, base) in vectors.VARIANTS.items():
+    for what, (config, base, target) in vectors.VARIANTS.items():
         timing, speed = vectors.variant(config, base, repeats)
-        target = "0.6 x" if "person" in what else ""
         report(f"kernel, N = 256, driver, 1 core: {what}", str(timing), f"{speed:.2f} x", target)
     report("memory of an environment", f"{vectors.bytes_per_environment():,} B", "", "4,096 B")
     for name, timing in parts.times(repeats).items():

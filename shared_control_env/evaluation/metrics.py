@@ -99,20 +99,8 @@ class Metric(NamedTuple):
 
 
 IDENTITY = (
-    *(
-        "scenario",
-        "degradation",
-        "driver",
-        "authority",
-        "seed",
-        "terminated",
-        "duration",
-        "K_h",
-        "T_h",
-        "person",
-        "response",
-        "noticed",
-    ),
+    *("scenario", "degradation", "driver", "authority", "seed", "terminated", "duration"),
+    *("K_h", "T_h", "person", "response", "noticed"),
     *("config_hash", "version", "versions"),
 )
 """Columns of the table that are no metrics."""

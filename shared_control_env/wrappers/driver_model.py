@@ -86,7 +86,8 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         shared = self.shared
         if self._given is None:
             command = checked_command(self.driver.act(shared.observation, shared.scene))
-            shared.memory["resting"] = isinstance(self.driver, PersonDriver) and self.driver.resting
+            if isinstance(self.driver, PersonDriver):
+                shared.memory["resting"] = self.driver.resting
             return command / shared.command_limits
         # Copies, so that a user's driver cannot change the simulation.
         command = checked_command(self.driver.act(shared.observation.copy(), shared.scene.copy()))

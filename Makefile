@@ -5,11 +5,12 @@ BIN = $(VENV)/bin
 RLLIB = $(VENV)-rllib
 PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
-.PHONY: help install reproduce reference sensitivity studies policies test rllib lint types golden hooks pythons bench figures clean
+.PHONY: help install reproduce reference benchmark sensitivity studies policies test rllib lint types golden hooks pythons bench figures clean
 
 help:
 	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
-	@echo "make reference  run the reference benchmark and write its table and report to results/reference"
+	@echo "make reference  rank all authorities by the fault that persons control with them, and write docs/reference.md"
+	@echo "make benchmark  run every driver and authority on the full suite, and write docs/benchmark.md"
 	@echo "make sensitivity  vary what the paper leaves open, and write a table and a picture to results/sensitivity"
 	@echo "make studies    repeat two published studies with the simulated persons, and write docs/studies.md"
 	@echo "make test       lint, types and all tests"
@@ -17,7 +18,7 @@ help:
 	@echo "make hooks      have git run lint, types and golden rollouts before every commit"
 	@echo "make pythons    the tests on every promised Python that this machine has"
 	@echo "make rllib      the tests of training on Ray, in a virtual environment of their own"
-	@echo "make policies   train the policies that ship, compare them, and write them and their card to agents/policies"
+	@echo "make policies   train the policies that ship, compare them, and write them and their card to the package"
 	@echo "make bench      speed, as ratios against highway-env and SciPy in the same run"
 	@echo "make figures    copy the README's pictures from results/paper"
 	@echo "make clean      remove the virtual environment"
@@ -42,6 +43,9 @@ reproduce: $(VENV)/.experiments
 	$(BIN)/python -m experiments.reproduce $(ARGS)
 
 reference: $(VENV)/.experiments
+	$(BIN)/python -m experiments.reference $(ARGS)
+
+benchmark: $(VENV)/.experiments
 	$(BIN)/python -m experiments.benchmark $(ARGS)
 
 sensitivity: $(VENV)/.experiments

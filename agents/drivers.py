@@ -13,11 +13,9 @@ from shared_control_env.controllers.driver import Driver
 from shared_control_env.controllers.recorded import RecordedDriver
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
 from shared_control_env.learned.policy import LearnedAllocator, LearnedDriver, Policy
+from shared_control_env.learned.shipped import shipped
 
 T = TypeVar("T")
-
-POLICIES = Path(__file__).parent / "policies"
-"""Folder of the trained policies that ship with the package, with their model card."""
 
 
 def _policy(path: Path) -> Callable[[], Driver]:
@@ -58,15 +56,6 @@ def _read(what: str, path: Path, read: Callable[[Path], Callable[[], T]]) -> Cal
 def _digest(path: Path) -> str:
     """Digest that distinguishes a file from other files of the same name."""
     return sha256(path.read_bytes()).hexdigest()[:16]
-
-
-def shipped(task: str) -> dict[str, Path]:
-    """Policies that ship with the package, by name.
-
-    Args:
-        task: key of :data:`agents.tasks.TASKS`.
-    """
-    return {path.stem: path for path in sorted(POLICIES.glob(f"{task}-*.npz"))}
 
 
 def driver_entry(source: str, trusted: bool = False) -> DriverEntry:

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import controllers, environments, parts, startup, suite, vectors
+from benchmarks import allocators, controllers, environments, parts, startup, suite, vectors
 from benchmarks.timing import Timing
 
 
@@ -44,6 +44,7 @@ def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timi
     report("import and first step, warm caches", f"{whole.median:.2f} s", "", "")
 
     _vectors(report, peer, limited, repeats)
+    _allocators(report, max(3, repeats // 3))
     seconds = Timing.of(suite.seconds_for(10_000, max(3, repeats // 5)))
     spread = f"{seconds.median:.0f} s ({seconds.low:.0f} to {seconds.high:.0f})"
     report("10,000 episodes of 10 s of the full suite, all cores", spread, "", "300 s")
@@ -58,6 +59,18 @@ def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timi
         table.add_row(*row)
     console.print(table)
     console.print(f"Python {platform.python_version()}, {packages}; {repeats} repeats, seed 0.")
+
+
+def _allocators(report: Callable[..., None], repeats: int) -> None:
+    """Rows of the allocators: a step of the kernel against that with the fuzzy inference, or a call from Python."""
+    found = list(allocators.costs(repeats))
+    fuzzy = next(cost.kernel for cost in found if cost.name == "proportional")
+    for cost in found:
+        if cost.kernel is not None and fuzzy is not None:
+            ratio = f"{cost.kernel.median / fuzzy.median:.2f} x the fuzzy inference's"
+            report(f"kernel, N = {allocators.N}, 1 core: {cost.name}", str(cost.kernel), ratio, "")
+        else:
+            report(f"in Python: {cost.name}, a decision", str(cost.call), "", "")
 
 
 def _vectors(report: Callable[..., None], peer: Timing, single: Timing, repeats: int) -> None:

@@ -57,7 +57,16 @@ def _triangulation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.n
 def _risk(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         scene, p = batch.scenes[i], batch.parameters[i]
-        assess(setup.calls.assess, scene, batch.traffic[i], batch.lines[i], p, batch.signals[i], works[0].motion)
+        assess(
+            setup.calls.assess,
+            p.task.tau_p,
+            scene,
+            batch.traffic[i],
+            batch.lines[i],
+            p,
+            batch.signals[i],
+            works[0].motion,
+        )
 
 
 @njit

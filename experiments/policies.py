@@ -1,8 +1,8 @@
 """Train the policies that ship, compare them on episodes left out of training, and write their model card.
 
 ``python -m experiments.policies`` trains five seeds of a driver and of an allocator. An interrupted run resumes. The
-command replaces ``agents/policies``: the policies, their learning curves, and the card in README.md with the numbers
-of this run.
+command replaces ``shared_control_env/learned/policies``: the policies, their learning curves, and the card in
+README.md with the numbers of this run.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ import typer
 from jinja2 import Template
 from rich.console import Console
 
-from agents.drivers import POLICIES
 from agents.evaluate import BASELINE, KINDS, LEARNED, METRICS, Row, compare, measure_and_show, shown, where_it_loses
 from agents.tasks import HELD_OUT_DEGRADATIONS, TASKS
 from agents.train import BEST, PROGRESS, Training
@@ -33,6 +32,8 @@ from shared_control_env.evaluation.episodes import versions
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.learned.shipped import BEST as NAMES_OF_BEST
+from shared_control_env.learned.shipped import POLICIES
 from shared_control_env.learned.views import DEAD_ZONE
 from shared_control_env.registration import ENVIRONMENTS
 
@@ -72,6 +73,16 @@ def state_of(task: str, seed: int) -> dict[str, Any]:
     """
     path = folder_of(task, seed) / PROGRESS
     return json.loads(path.read_text()) if path.is_file() else {"steps": 0}
+
+
+def best_score(task: str, seed: int) -> float:
+    """Largest mean return of a training in validation.
+
+    Args:
+        task: key of :data:`agents.tasks.TASKS`.
+        seed: training seed.
+    """
+    return max(score for _, score in state_of(task, seed)["scores"])
 
 
 def train(task: str, seed: int, steps: int) -> None:
@@ -245,6 +256,8 @@ def publish(seeds: int, jobs: int, console: Console) -> None:
     for task in TASKS:
         for seed in SEEDS:
             shutil.copyfile(folder_of(task, seed) / BEST, POLICIES / f"{task}-{seed}.npz")
+    names = {task: f"{task}-{max(SEEDS, key=lambda seed: best_score(task, seed))}" for task in TASKS}
+    write_atomically(POLICIES / NAMES_OF_BEST, lambda draft: draft.write_text(json.dumps(names)))
     draw_curves(POLICIES / "curves.png")
     write_atomically(POLICIES / "README.md", lambda draft: draft.write_text(card(tables, jobs)))
     console.print(f"The policies and their card are in {POLICIES}.")

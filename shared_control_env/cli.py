@@ -21,10 +21,11 @@ from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import combined
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose_one
-from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS, EpisodeBatch, settings_of
+from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS, EpisodeBatch, Fault, settings_of
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
-from shared_control_env.evaluation.storage import REPORT, TABLE
+from shared_control_env.evaluation.severity import parse_fault
+from shared_control_env.evaluation.storage import MARGINS, REPORT, TABLE
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 COLUMNS = {
@@ -131,6 +132,80 @@ def benchmark(
     console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.", markup=False)
 
 
+@app.command()
+def controllability(
+    kinds: Annotated[str, typer.Option(help="Kinds of fault separated by commas, or all.")] = "all",
+    channel: Annotated[str, typer.Option(help="steering, acceleration or both.")] = "steering",
+    drivers: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "population",
+    authorities: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "all",
+    scenarios: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "all",
+    keep: Annotated[str, typer.Option(help="What counts as controlled: lane, road or collision.")] = "lane",
+    at: Annotated[str, typer.Option(help="Severity to classify, such as 0.1, or bias=0.1,delay=0.4.")] = "",
+    last: Annotated[bool, typer.Option(help="How long a fault of that severity may last, too.")] = False,
+    budget: Annotated[int, typer.Option(min=1, help="Largest number of episodes.")] = 20_000,
+    width: Annotated[float, typer.Option(help="Wanted width of the intervals, share of the largest severity.")] = 0.1,
+    seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    engine: Annotated[str, typer.Option(help="local, or ray for a Ray cluster.")] = "local",
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results/controllability"),
+    fresh: Annotated[bool, typer.Option(help="Remove the results that the folder holds, and begin again.")] = False,
+) -> None:
+    """How large a fault drivers control under each authority; stopped at any moment, it goes on where it was."""
+    from shared_control_env.evaluation.controllability import controllability as run_study
+    from shared_control_env.evaluation.controllability_report import severity
+    from shared_control_env.evaluation.progress import progress_bar
+
+    console = Console()
+    out = out.expanduser()
+    with _in_words(console), resumable(out), progress_bar(console) as bar:
+        task = bar.add_task("episodes", total=None)
+        table = run_study(
+            _names(kinds),
+            _names(authorities),
+            _names(drivers),
+            channel=channel,
+            scenarios=_names(scenarios),
+            keep=keep,
+            at=_severities(at),
+            last=last,
+            budget=budget,
+            width=width,
+            seed=seed,
+            out=out,
+            fresh=fresh,
+            jobs=jobs,
+            engine=engine,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    printed = Table(title="Largest severity that 90 % control, and its 95 % interval", pad_edge=False)
+    for name in ("fault", "driver", "authority", "s_90", "class"):
+        printed.add_column(name, justify="right" if name == "s_90" else "left")
+    for row in table.to_dict("records"):
+        margin, low, high = (severity(row[name]) for name in ("s_90", "s_90_low", "s_90_high"))
+        at_most = f"{row['class']} at {row['at']:.3g}" if row["class"] else "-"
+        cells = (row["fault"], row["driver"], row["authority"], f"{margin} ({low} to {high}) {row['unit']}", at_most)
+        printed.add_row(*(escape(str(cell)) for cell in cells))
+    console.print(printed)
+    wide = int((~table["settled"]).sum())
+    if wide:
+        console.print(
+            f"{wide} of {len(table)} intervals are wider than {width:g} of the grid; raise --budget to narrow them."
+        )
+    console.print(f"The report is {out / REPORT}, the margins {out / MARGINS[0]}.", markup=False)
+
+
+def _severities(text: str) -> float | dict[str, float] | None:
+    """Severities in an option's text: one number, or one for each kind; None for an empty text."""
+    if not text:
+        return None
+    try:
+        if "=" not in text:
+            return float(text)
+        return {kind.strip(): float(value) for kind, value in (part.split("=") for part in text.split(","))}
+    except ValueError:
+        raise typer.BadParameter(f"at = {text!r} must be a number, or kind=number for each kind, by commas") from None
+
+
 def summary(table: Any, width: int = 80) -> Table | str:
     """Means of the main metrics by authority and driver: a table, or lines of text if the terminal is too narrow.
 
@@ -159,7 +234,9 @@ def replay(
     scenario: Annotated[str, typer.Option(help="Scenario of the episode.")],
     driver: Annotated[str, typer.Option(help="Driver.")] = "mpc",
     authority: Annotated[str, typer.Option(help="Authority.")] = "paper",
-    degradation: Annotated[str, typer.Option(help="Degradation; own for the scenario's.")] = AS_GIVEN,
+    degradation: Annotated[
+        str, typer.Option(help="Degradation; own for the scenario's; or kind:channel:size:duration.")
+    ] = AS_GIVEN,
     seed: Annotated[int, typer.Option(min=0, help="Seed.")] = 0,
     source: Annotated[
         Path | None, typer.Option("--from", help="Folder of a benchmark, whose settings and own drivers it has.")
@@ -180,8 +257,11 @@ def replay(
             # First of all, since what it imports may add the scenario or the degradation.
             first, second, config, automation = entries_of(source.expanduser(), driver, authority)
         choose_one("scenario", scenario, SCENARIOS)
-        choose_one("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
-        given = None if degradation == AS_GIVEN else degradation
+        given: Fault = None if degradation == AS_GIVEN else degradation
+        if ":" in degradation:
+            given = parse_fault(degradation)
+        else:
+            choose_one("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
         frames: list[Any] | None = None if video is None else []
         pair = (driver, first), (authority, second)
         batch = EpisodeBatch(scenario, *pair, ((given, seed),), config, automation)

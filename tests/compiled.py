@@ -51,7 +51,7 @@ def monitor_with(
 ) -> None:
     s, p, g = scene[()], parameters[()], signals[()]
     degrade(g.u_a_des, s.k, p.task.dt, faults, memories, p.limits, g.u_a_f)
-    _assess(address, s, traffic, line, p, g, work[()])
+    _assess(address, p.task.tau_p, s, traffic, line, p, g, work[()])
 
 
 def monitor(

@@ -137,3 +137,15 @@ def test_the_recipes_run_from_outside_the_package(tmp_path):
     path.write_text("\n\n".join(code))
     result = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
+
+
+def test_the_worked_example_runs(tmp_path):
+    """The block of the page on controllability: six curves, and the limiter that is best in it takes the larger fault."""
+    text = (ROOT / "docs/controllability.md").read_text()
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    check = "of = table.set_index(['over', 'authority'])['s_90']\nassert of['size', 'barrier'] > of['size', 'none']\n"
+    (tmp_path / "example.py").write_text(block + check + "assert len(table) == 6\n")
+    result = subprocess.run([sys.executable, "example.py"], capture_output=True, text=True, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "curve_at_25/report.html").is_file()
+    assert "```text" in text  # the output that the page shows

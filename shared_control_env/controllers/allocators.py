@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import exp, inf
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -11,17 +12,36 @@ from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.lead import lead_of
 from shared_control_env.controllers.stateless import Stateless
 from shared_control_env.core.authority import allocators as compiled_allocators
+from shared_control_env.core.authority.alerts import ALERTS, NO_ALERT
+from shared_control_env.core.authority.allocators import FUZZY
 from shared_control_env.core.authority.fuzzy import OPERATORS, authority
 from shared_control_env.nearest import hint
+
+
+class Allocation(NamedTuple):
+    """What an allocator decides, if it is more than one number.
+
+    Attributes:
+        alpha: authority of the automation [-], or one for each channel, acceleration and steering, shape (2,).
+        alert: what the driver is told, one of :data:`core.authority.alerts.ALERTS`.
+    """
+
+    alpha: Any
+    alert: str = "none"
 
 
 @runtime_checkable
 class Allocator(Protocol):
     """Anything that decides how much authority the automation has.
 
-    An allocator that the kernel also runs has an attribute ``compiled``. It is a function of scene, signals and
-    parameters that numba compiles (:data:`core.authority.allocators.ALLOCATE`), and it returns the same value as
-    ``allocate``.
+    Three attributes are optional:
+
+    - ``compiled``: a function that numba compiles (:data:`core.authority.allocators.ALLOCATE`), and that returns the
+      same as ``allocate``. The kernel runs it.
+    - ``needs_u_a_des = True``: the allocator sees u_a,des, the command without the fault. It is hidden otherwise, since
+      a limiter behind the fault does not know it.
+    - ``needs_assess = True``: ``allocate`` gets a third argument, an
+      :class:`~shared_control_env.controllers.assessor.Assessor`.
     """
 
     def reset(self, seed: int | None = None) -> None:
@@ -32,75 +52,141 @@ class Allocator(Protocol):
         """
         ...
 
-    def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """Decide on alpha_a for one step.
+    @property
+    def allocate(self) -> Callable[..., Any]:
+        """A method ``allocate(scene, signals)`` that decides on the authority of one step.
 
         Args:
             scene: what the sensors give, a record of :data:`core.records.SCENE`.
             signals: signals of the same step, a record of :data:`core.records.SIGNALS`: the automation's degraded
-                command ``u_a_f``, the predicted position under that command (``prediction_road``), and its risks
-                ``r_x`` and ``r_y``.
+                command ``u_a_f``, the predicted position under that command (``prediction_road``), its risks ``r_x``
+                and ``r_y``, and the driver's present actual command ``u_h_act``. ``u_h_des``, ``u_a_act``, ``u`` and
+                ``alpha`` are those of the previous step. ``fault`` and ``misperception`` are NaN, and so is
+                ``u_a_des`` unless the allocator needs it.
 
         Returns:
-            alpha_a, finite; the caller clips it to [0, 1].
+            alpha_a; or one authority for each channel, ``[over acceleration, over steering]``; or an
+            :class:`Allocation`. Numbers must be finite; the caller clips them to [0, 1].
         """
         ...
 
 
-def checked_authority(alpha_a: Any, who: str = "allocator") -> float:
-    """Check the value that an allocator's ``allocate`` returned, and convert it to a float.
+def checked_allocation(decided: Any, who: str = "allocator") -> tuple[np.ndarray, int]:
+    """Check what an allocator's ``allocate`` returned, and convert it to one authority for each channel.
 
     An array with one number is accepted, such as a policy's prediction.
 
     Args:
-        alpha_a: the authority [-].
+        decided: what was returned.
         who: name of the allocator for the error message.
 
+    Returns:
+        Authorities over acceleration and steering [-], shape (2,); index of the alert.
+
     Raises:
-        ValueError: if the value is not one finite number.
+        ValueError: if the value is not one finite number, two, or an :class:`Allocation` with a known alert.
     """
-    array = as_numbers(alpha_a)
-    if array.size != 1 or not np.isfinite(array).all():
-        raise ValueError(f"{who}: allocate() gave {alpha_a!r}; it must return one finite number alpha_a in [0, 1]")
-    return array.item()
+    alpha, alert = decided if isinstance(decided, Allocation) else (decided, ALERTS[NO_ALERT])
+    array = as_numbers(alpha)
+    if array.size not in (1, 2) or not np.isfinite(array).all():
+        raise ValueError(
+            f"{who}: allocate() gave {alpha!r}; it must return one finite number alpha_a in [0, 1], one for each "
+            "channel, or an Allocation"
+        )
+    if alert not in ALERTS:
+        raise ValueError(f"{who}: allocate() gave the alert {alert!r}; {hint(alert, ALERTS)}")
+    return np.broadcast_to(array.reshape(-1), (2,)), ALERTS.index(alert)
+
+
+def decide(
+    allocator: Allocator, scene: np.ndarray, signals: np.ndarray, assess: Any, who: str
+) -> tuple[np.ndarray, int]:
+    """Let an allocator decide, with the third argument if it needs it.
+
+    Args:
+        allocator: the allocator.
+        scene, signals: as in :meth:`Allocator.allocate`.
+        assess: the :class:`~shared_control_env.controllers.assessor.Assessor` of the environment.
+        who: name of the allocator for error messages.
+
+    Returns:
+        As :func:`checked_allocation`.
+    """
+    more = (assess,) if getattr(allocator, "needs_assess", False) else ()
+    return checked_allocation(allocator.allocate(scene, signals, *more), who)
+
+
+def hide(signals: np.ndarray, allocator: Allocator) -> None:
+    """Replace by NaN what an allocator must not know.
+
+    Args:
+        signals: copies of records of :data:`core.records.SIGNALS`, any shape; changed.
+        allocator: the allocator.
+    """
+    signals["fault"] = signals["misperception"] = np.nan
+    if not getattr(allocator, "needs_u_a_des", False):
+        signals["u_a_des"] = np.nan
+
+
+def in_kernel(allocator: Any) -> Any:
+    """The function of an allocator that the kernel can run; None if it has none.
+
+    Args:
+        allocator: an allocator.
+    """
+    compiled = getattr(allocator, "compiled", None)
+    return compiled if callable(compiled) else None
 
 
 class FuzzyAuthority(Stateless):
     """The paper's fuzzy inference, ``alpha_a = FIS(r_x, r_y)`` (Eq. 9).
 
     Args:
-        operators: name of the fuzzy operators, one of :data:`core.authority.fuzzy.OPERATORS`.
+        operators: name of the fuzzy operators, one of :data:`core.authority.fuzzy.OPERATORS`; None for those of the
+            environment's settings.
 
     Attributes:
-        operators: name of the fuzzy operators.
+        operators: name of the fuzzy operators, or None.
         compiled: the allocator for the kernel.
     """
 
-    def __init__(self, operators: str = "product-sum") -> None:
-        if operators not in OPERATORS:
-            raise ValueError(f"operators = {operators!r}; {hint(operators, OPERATORS)}")
+    def __init__(self, operators: str | None = None) -> None:
+        if operators is not None and operators not in OPERATORS:
+            raise ValueError(f"operators = {operators!r}; {hint(operators, OPERATORS)}, or None")
         self.operators = operators
-        self.compiled = compiled_allocators.FUZZY[operators]
+        self.compiled = compiled_allocators.fuzzy_authority if operators is None else FUZZY[operators]
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
-        """alpha_a of one step.
+        """alpha_a of one step; without a choice of operators, by the default ones.
 
         Args:
             scene: record of :data:`core.records.SCENE`; not used.
             signals: record of :data:`core.records.SIGNALS`; the risks ``r_x`` and ``r_y`` are used.
         """
-        return authority(float(signals["r_x"]), float(signals["r_y"]), OPERATORS.index(self.operators))
+        operators = OPERATORS[0] if self.operators is None else self.operators
+        return authority(float(signals["r_x"]), float(signals["r_y"]), OPERATORS.index(operators))
 
 
 class FixedAuthority(Stateless):
-    """A constant authority.
+    """A constant authority. The kernel runs it for 0 and 1.
 
     Args:
+        alpha: the authority in [0, 1] [-].
+
+    Attributes:
         alpha: the authority [-].
+        compiled: the allocator for the kernel; None if the kernel does not run it.
+
+    Raises:
+        ValueError: if the authority is not in [0, 1].
     """
 
     def __init__(self, alpha: float = 0.5) -> None:
+        if not 0.0 <= alpha <= 1.0:
+            raise ValueError(f"alpha = {alpha!r} must be in [0, 1]")
         self.alpha = alpha
+        constants = {0.0: compiled_allocators.no_authority, 1.0: compiled_allocators.full_authority}
+        self.compiled = constants.get(float(alpha))
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
         """The constant authority.

@@ -220,6 +220,7 @@ class Work:
         finding: scratch of the search for the safe area.
         automation_view: the scene as the automation perceives it.
         motion: scratch of the vehicles' motion.
+        trial: signals of a command whose risks an allocator asks for.
         command: the driver's desired command ``[a, delta]`` [m/s^2, rad].
     """
 
@@ -227,6 +228,7 @@ class Work:
     finding: Finding
     automation_view: Scene
     motion: Motion
+    trial: Signals
     command: Vector2
 
 

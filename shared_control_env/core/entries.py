@@ -10,6 +10,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from shared_control_env.core.authority import allocators
+from shared_control_env.core.authority.allocators import Situation
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.control import automation, driver, driver_lag, person
 from shared_control_env.core.world import actuator, vehicle
@@ -18,7 +20,7 @@ from shared_control_env.core.world import traffic as traffic_model
 Boxed: TypeAlias = Any
 """A record held in a 0-d array."""
 
-_automate = automation.AUTOMATE.call
+_automate, _allocate = automation.AUTOMATE.call, allocators.ALLOCATE.call
 
 
 @jit
@@ -192,3 +194,61 @@ def add_arm_noise(u_h_des: np.ndarray, memory: Boxed, parameters: Boxed) -> None
         parameters: :class:`core.parameters.Parameters`, a 0-d array.
     """
     person.add_arm_noise(u_h_des, memory[()], parameters[()])
+
+
+@jit
+def risks_of(
+    a: float,
+    delta: float,
+    tau: float,
+    scene: Boxed,
+    signals: Boxed,
+    memory: Boxed,
+    parameters: Boxed,
+    traffic: np.ndarray,
+    line: np.ndarray,
+    trial: Boxed,
+    motion: Boxed,
+    assess: int,
+) -> tuple[float, float]:
+    """Compute the risks of any command, see :func:`authority.allocators.risks_of`.
+
+    Args:
+        a: acceleration [m/s^2].
+        delta: steering angle [rad].
+        tau: prediction horizon [s].
+        scene, signals, memory, parameters, trial, motion: records of the situation, 0-d arrays.
+        traffic, line, assess: as in :class:`authority.allocators.Situation`.
+
+    Returns:
+        r_x and r_y [-].
+    """
+    now = Situation(scene[()], signals[()], memory[()], parameters[()], traffic, line, trial[()], motion[()], assess)
+    return allocators.risks_of(a, delta, tau, now)
+
+
+@jit
+def allocate(
+    address: int,
+    scene: Boxed,
+    signals: Boxed,
+    memory: Boxed,
+    parameters: Boxed,
+    traffic: np.ndarray,
+    line: np.ndarray,
+    trial: Boxed,
+    motion: Boxed,
+    assess: int,
+) -> tuple[float, float, int]:
+    """Let a compiled allocator decide, see :data:`authority.allocators.ALLOCATE`.
+
+    Args:
+        address: address of the compiled function.
+        scene, signals, memory, parameters, trial, motion: records of the situation, 0-d arrays.
+        traffic, line, assess: as in :class:`authority.allocators.Situation`.
+
+    Returns:
+        Authorities over acceleration and over steering [-]; index of the alert.
+    """
+    now = Situation(scene[()], signals[()], memory[()], parameters[()], traffic, line, trial[()], motion[()], assess)
+    return _allocate(address, now)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.core.authority.allocators import ALLOCATE
+from shared_control_env.core.authority.allocators import ALLOCATE, Situation
 from shared_control_env.core.batch import Batch, Environment, Outputs, Setup, Work, environment
 from shared_control_env.core.compile.atomics import fetch_add
 from shared_control_env.core.compile.jit import jit, jit_inlined
@@ -58,7 +58,7 @@ def fill_slots(
     work: Work,
     program: Program,
     report: DriverReport,
-) -> float:
+) -> None:
     """Fill both slots of a step, the driver's command and alpha_a, from bound functions or from the action.
 
     A slot is bound where ``setup.calls`` holds the address of a driver or of an allocator.
@@ -66,15 +66,12 @@ def fill_slots(
     Args:
         i: index of the environment.
         commands: the driver's commands divided by their limits [-], shape (N, 2); ignored where a driver is bound.
-        alphas: authorities of the automation [-], shape (N, 1); ignored where an allocator is bound.
-        e: environment i.
+        alphas: authorities of the automation over each channel [-], shape (N, 2); ignored where an allocator is bound.
+        e: environment i; ``signals.alpha``, clipped to [0, 1], and an allocator's ``signals.alert`` are written.
         setup: what all environments share; its calls say which slots are bound.
         work: scratch; ``work.command`` receives the driver's desired command [m/s^2, rad].
         program: record of :data:`predictive_driver.PROGRAM`; unused where no driver is bound.
         report: record of :data:`predictive_driver.DRIVER_REPORT`, written where a driver is bound.
-
-    Returns:
-        alpha_a, clipped to [0, 1] [-].
     """
     if setup.calls.drive != 0:
         drive(setup.calls.drive, e.scene, e.p, e.memory, e.person, work.condensing, program, report)
@@ -82,10 +79,21 @@ def fill_slots(
     else:
         work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * e.p.limits.a_max
         work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * e.p.limits.delta_max
-    alpha_a = alphas[i, 0]
+    over_a, over_delta = alphas[i, 0], alphas[i, 1]
     if setup.calls.allocate != 0:
-        alpha_a = allocate(setup.calls.allocate, e.scene, e.signals, e.p)
-    return min(max(alpha_a, 0.0), 1.0)
+        situation = Situation(
+            e.scene,
+            e.signals,
+            e.memory,
+            e.p,
+            e.traffic,
+            e.line,
+            work.trial,
+            work.motion,
+            setup.calls.assess,
+        )
+        over_a, over_delta, e.signals.alert = allocate(setup.calls.allocate, situation)
+    e.signals.alpha[0], e.signals.alpha[1] = min(max(over_a, 0.0), 1.0), min(max(over_delta, 0.0), 1.0)
 
 
 @jit
@@ -127,7 +135,7 @@ def begin(i: int, batch: Batch, setup: Setup, out: Outputs) -> None:
             batch.plans[i, j] = starts.plans[0, j]
     batch.ended[i] = False
     batch.scenes[i].felt[0] = batch.scenes[i].felt[1] = 0.0
-    batch.scenes[i].displayed = 1.0
+    batch.scenes[i].displayed, batch.scenes[i].alert = 1.0, 0
     clear_faults(batch.fault_memories[i])
     clear_memory(batch.memories[i])
     clear_automation(batch.automations[i])
@@ -188,7 +196,7 @@ def advance_one(
         i: index of the environment.
         resetting: whether to begin an episode instead of making a time step.
         commands: the driver's commands divided by their limits [-], shape (N, 2).
-        alphas: authorities of the automation [-], shape (N, 1).
+        alphas: authorities of the automation over each channel [-], shape (N, 2).
         batch: state of all environments; entry i is written.
         setup: what all environments share.
         out: outputs of all environments; the entries of environment i are written.
@@ -202,8 +210,8 @@ def advance_one(
     else:
         k = e.scene.k + 1
         depart(e)
-        alpha_a = fill_slots(i, commands, alphas, e, setup, work, program, out.drivers[i])
-        act(work.command, alpha_a, e)
+        fill_slots(i, commands, alphas, e, setup, work, program, out.drivers[i])
+        act(work.command, e)
         note(i, e, out)
         move(e, setup, work)
     plan(k, e, setup.calls, work)
@@ -232,7 +240,7 @@ def advance_through(
         steps: number of time steps.
         autoreset: whether to begin the next episode after one has ended (autoreset); if False, stop at the end.
         commands: the driver's commands divided by their limits [-], shape (N, 2), held over the steps.
-        alphas: authorities of the automation [-], shape (N, 1), held over the steps.
+        alphas: authorities of the automation over each channel [-], shape (N, 2), held over the steps.
         batch: state of all environments; entry i is written.
         setup: what all environments share.
         out: outputs of all environments; the entries of environment i are those of its last step.
@@ -280,7 +288,7 @@ def advance(
         autoreset: whether an environment whose episode has ended uses a step to begin the next one; if False, the
             environment stops.
         commands: the driver's commands divided by their limits [-], shape (N, 2).
-        alphas: authorities of the automation [-], shape (N, 1).
+        alphas: authorities of the automation over each channel [-], shape (N, 2).
         batch: state of all environments, see :class:`batch.Batch`.
         setup: what all environments share, see :class:`batch.Setup`.
         out: outputs of each environment's last step, written, see :class:`batch.Outputs`.
@@ -319,7 +327,7 @@ def respond(
 
     Args:
         commands: the driver's commands divided by their limits [-], shape (N, 2).
-        alphas: authorities of the automation [-], shape (N, 1).
+        alphas: authorities of the automation over each channel [-], shape (N, 2).
         batch: state of all environments; entry 0 is written.
         setup: what all environments share.
         out: outputs of all environments; info and driver's report of environment 0 are written.
@@ -328,8 +336,8 @@ def respond(
     """
     e = environment(0, batch)
     depart(e)
-    alpha_a = fill_slots(0, commands, alphas, e, setup, works[0], programs[0], out.drivers[0])
-    act(works[0].command, alpha_a, e)
+    fill_slots(0, commands, alphas, e, setup, works[0], programs[0], out.drivers[0])
+    act(works[0].command, e)
     note(0, e, out)
 
 
@@ -404,7 +412,7 @@ def judge(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> Non
     if not automated:
         decide_automation(see(e, works[0]), e, setup.calls, works[0])
     degrade_command(e)
-    assess(setup.calls.assess, e.scene, e.traffic, e.line, e.p, e.signals, works[0].motion)
+    assess(setup.calls.assess, e.p.task.tau_p, e.scene, e.traffic, e.line, e.p, e.signals, works[0].motion)
 
 
 @jit

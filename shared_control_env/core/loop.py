@@ -56,7 +56,7 @@ def plan(k: int, e: Environment, calls: Calls, work: Work) -> None:
     find_safe_area(e, calls, work)
     decide_automation(see(e, work), e, calls, work)
     degrade_command(e)
-    assess(calls.assess, e.scene, e.traffic, e.line, e.p, e.signals, work.motion)
+    assess(calls.assess, e.p.task.tau_p, e.scene, e.traffic, e.line, e.p, e.signals, work.motion)
 
 
 @jit_inlined
@@ -132,29 +132,27 @@ def degrade_command(e: Environment) -> None:
 
 
 @jit_inlined
-def act(u_h_des: np.ndarray, alpha_a: float, e: Environment) -> None:
-    """Run the second half of a time step: from alpha_a and the driver's command to the vehicle's command u.
+def act(u_h_des: np.ndarray, e: Environment) -> None:
+    """Run the second half of a time step: from ``signals.alpha`` and the driver's command to the command u.
 
     Args:
         u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
-        alpha_a: authority of the automation, in [0, 1] [-].
         e: the environment; its signals, its memory and what the driver feels and sees of the automation are written.
     """
-    apply_authority(alpha_a, e)
+    apply_authority(e)
     apply_driver(u_h_des, e.p, e.scene, e.memory, e.signals)
 
 
 @jit_inlined
-def apply_authority(alpha_a: float, e: Environment) -> None:
+def apply_authority(e: Environment) -> None:
     """Compute u_a,act by Eq. 10 or another law, then apply the degradations at the actuator to it.
 
     Args:
-        alpha_a: authority of the automation, in [0, 1] [-].
         e: the environment; its signals and fault memories are written.
     """
     signals, choice = e.signals, e.p.authority
-    signals.alpha_a = alpha_a
-    apply_law(choice.law, signals.u_a_des, signals.u_a_f, alpha_a, e.p.law, choice.strict, signals.u_a_act)
+    signals.alpha_a = min(signals.alpha[0], signals.alpha[1])
+    apply_law(choice.law, signals.u_a_des, signals.u_a_f, signals.alpha, e.p.law, choice.strict, signals.u_a_act)
     if choice.fault_at == ACTUATOR:
         sound_a, sound_delta = signals.u_a_act[0], signals.u_a_act[1]
         degrade(signals.u_a_act, e.scene.k, e.p.task.dt, e.faults, e.fault_memories, e.p.limits, signals.u_a_act)
@@ -171,7 +169,8 @@ def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memor
     Args:
         u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
         p: parameters.
-        scene: record of :data:`records.SCENE`; ``felt`` (u_a,act) and ``displayed`` (alpha_a) are written.
+        scene: record of :data:`records.SCENE`; ``felt`` (u_a,act), ``displayed`` (alpha_a) and ``alert`` are
+            written.
         memory: record of :data:`records.MEMORY`; the driver's lag advances, and the last commands are stored.
         signals: record of :data:`records.SIGNALS`; ``u_h_des``, ``u_h_act`` and ``u`` are written.
     """
@@ -182,7 +181,7 @@ def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memor
         signals.u[i] = min(max(signals.u_a_act[i] + signals.u_h_act[i], -bound), bound)
         memory.u_h_des[i], memory.u[i], scene.felt[i] = signals.u_h_des[i], signals.u[i], signals.u_a_act[i]
     advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
-    scene.displayed = signals.alpha_a
+    scene.displayed, scene.alert = signals.alpha_a, signals.alert
 
 
 @jit_inlined
@@ -291,7 +290,8 @@ def clear_signals(signals: Signals) -> None:
         vector[0], vector[1] = 0.0, 0.0
     for i in range(6):
         signals.prediction[i] = 0.0
-    signals.r_x, signals.r_y, signals.alpha_a = 0.0, 0.0, 1.0
+    signals.alpha[0] = signals.alpha[1] = 1.0
+    signals.r_x, signals.r_y, signals.alpha_a, signals.alert = 0.0, 0.0, 1.0, 0
     signals.status, signals.iterations, signals.residual = 0, 0, 0.0
 
 

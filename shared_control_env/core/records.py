@@ -113,6 +113,7 @@ class Scene:
         change_weight: share of the weights of a lane change in the longitudinal risk [-].
         felt: the automation's actual command of the previous step, felt at wheel and pedal [m/s^2, rad].
         displayed: alpha_a of the previous step, as displayed to the driver [-].
+        alert: alert of the previous step, index in :data:`core.authority.alerts.ALERTS`.
         neighbours: rows of the follower, the leader and the preceding vehicle, columns PRESENT to NEAR_ROW.
         bodies: half the sum of the lengths of the ego and of the preceding vehicle [m]: the distance between their
             centres minus their gap.
@@ -131,6 +132,7 @@ class Scene:
     change_weight: float
     felt: Vector2
     displayed: float
+    alert: int
     neighbours: Annotated[np.ndarray, (3, 5)]
     bodies: float
     region: Annotated[np.ndarray, (4,)]
@@ -149,7 +151,9 @@ class Signals:
         prediction_road: predicted position (s, d) of the ego in the road frame [m].
         predicted_neighbours: rows [1 if present, s [m], speed [m/s]] of the neighbours after tau_p.
         r_x, r_y: longitudinal and lateral risk [-].
-        alpha_a: authority of the automation [-].
+        alpha: authority of the automation over each channel, acceleration and steering [-].
+        alpha_a: the smaller of the two [-].
+        alert: what the allocator tells the driver, index in :data:`core.authority.alerts.ALERTS`.
         u_a_act: the automation's actual command.
         u_h_des: the driver's desired command.
         u_h_act: the driver's actual command.
@@ -168,7 +172,9 @@ class Signals:
     predicted_neighbours: Annotated[np.ndarray, (3, 3)]
     r_x: float
     r_y: float
+    alpha: Vector2
     alpha_a: float
+    alert: int
     u_a_act: Vector2
     u_h_des: Vector2
     u_h_act: Vector2
@@ -246,6 +252,7 @@ class PersonMemory:
         noticed: time at which the person noticed something [s]; infinite before.
         response: this person's time from noticing to acting [s]; 0 for one who drives from the start.
         reason: what the person noticed, index in person.REASONS.
+        alerted: time for which an alert has lasted [s].
     """
 
     past: Annotated[np.ndarray, (MAX_DELAY, 6)]
@@ -255,6 +262,7 @@ class PersonMemory:
     noticed: float
     response: float
     reason: int
+    alerted: float
 
 
 class Transition:

@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from shared_control_env.controllers.assessor import Assessor
 from shared_control_env.controllers.automation import Automation, Planner
 from shared_control_env.controllers.driver import checked_command
 from shared_control_env.controllers.solution import Solution
@@ -95,7 +96,7 @@ class SharedControlEnv(HighwayEnv):
         self._adopted: dict[str, Any] | None = None
         self._spec: Any = None
         self._works, self._programs = np.zeros(1, WORK), np.zeros(1, PROGRAM)
-        self._commands, self._alphas = np.zeros((1, 2)), np.zeros((1, 1))
+        self._commands, self._alphas = np.zeros((1, 2)), np.zeros((1, 2))
         self._taken, self._everyone = np.zeros(1, dtype=np.int64), np.ones(1, dtype=bool)
         self._rewarded, self._ends = np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)
         self._calls = NOT_LOADED
@@ -334,7 +335,7 @@ class SharedControlEnv(HighwayEnv):
         Raises:
             ValueError: if the action is malformed; the state is unchanged then.
         """
-        self._commands[0], self._alphas[0, 0] = self.action_type.decode(action)
+        self._commands[0], self._alphas[0] = self.action_type.decode(action)
         if self._bound != [self.vehicle, *self.road.vehicles]:
             self._bind()
         self._advance(resetting=False)
@@ -429,6 +430,17 @@ class SharedControlEnv(HighwayEnv):
     def signals(self) -> np.ndarray:
         """Signals planned for the present scene after a reset or step, a record of :data:`records.SIGNALS`."""
         return self._batch.signals.reshape(())
+
+    def signals_for_allocator(self) -> np.ndarray:
+        """Copy of the signals with the driver's present u_h,act, a record of :data:`records.SIGNALS`."""
+        signals = self.signals.copy()
+        signals["u_h_act"] = self.memory["u_h_act"]
+        return signals
+
+    @property
+    def assessor(self) -> Assessor:
+        """Answers to an allocator's questions about the present step."""
+        return Assessor(0, self._batch, self._calls)
 
     @property
     def memory(self) -> np.ndarray:

@@ -8,9 +8,11 @@ from shared_control_env.evaluation.catalogue import (
     DriverEntry,
     Suite,
 )
+from shared_control_env.evaluation.controllability import controllability
 from shared_control_env.evaluation.metrics import METRICS, Metric, Trajectory, metric
 from shared_control_env.evaluation.replay import replay_episode
 from shared_control_env.evaluation.runner import evaluate
+from shared_control_env.evaluation.statistics import summarise
 
 __all__ = [
     "AUTHORITIES",
@@ -22,7 +24,9 @@ __all__ = [
     "Metric",
     "Suite",
     "Trajectory",
+    "controllability",
     "evaluate",
     "metric",
     "replay_episode",
+    "summarise",
 ]

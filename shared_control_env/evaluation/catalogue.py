@@ -9,13 +9,16 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 from shared_control_env.controllers.allocators import (
     Allocator,
     FixedAuthority,
+    FuzzyAuthority,
     HardTakeover,
     LinearAuthority,
     SoftmaxAuthority,
     TimeBasedAuthority,
 )
 from shared_control_env.controllers.automation import Planner
+from shared_control_env.controllers.disagreement import Guardian, IntentAuthority, ResidualAuthority
 from shared_control_env.controllers.driver import Driver, check_reset
+from shared_control_env.controllers.safety import BarrierAuthority, PredictiveFilter, SafeHIL
 from shared_control_env.controllers.scripted import (
     DistractedDriver,
     FightingDriver,
@@ -27,6 +30,7 @@ from shared_control_env.core.parameters import IDENTIFIED_DRIVERS, PERSONS, Pers
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import DRAWN_V1, SCENARIOS
 from shared_control_env.envs.settings import as_plain
+from shared_control_env.learned.shipped import learned_allocator, learned_driver
 from shared_control_env.nearest import hint, nearest
 
 T = TypeVar("T")
@@ -61,14 +65,14 @@ class AuthorityEntry(NamedTuple):
     Attributes:
         description: description in one line.
         law: name of the law, one of :data:`core.authority.laws.LAWS`.
-        make: makes an allocator for each environment; None for the paper's fuzzy inference, which the kernel runs.
+        make: makes an allocator for each environment, by default the paper's. The kernel runs one with ``compiled``.
         fingerprint: text that distinguishes this authority from others of the same name; None to compute a digest from
             its code and arguments.
     """
 
     description: str
     law: str
-    make: Callable[[], Allocator] | None = None
+    make: Callable[[], Allocator] = FuzzyAuthority
     fingerprint: str | None = None
 
 
@@ -128,20 +132,34 @@ DRIVERS: dict[str, DriverEntry] = {
     "distracted": DriverEntry("lets go until 1 s after the authority falls, then recovers", DistractedDriver),
     "over_reacting": DriverEntry("the scripted driver, 2.5 times as hard", OverreactingDriver),
     "fighting": DriverEntry("pushes against what the automation does differently", FightingDriver),
+    "learned": DriverEntry("trained driver that comes with the package", learned_driver),
     "none": DriverEntry("nobody at the wheel", config={"driver_lag": {"K_h": 0.0}}),
 }
 """Drivers by name."""
 
 AUTHORITIES: dict[str, AuthorityEntry] = {
-    "paper": AuthorityEntry("fuzzy inference, Eq. 10", "paper"),
-    "proportional": AuthorityEntry("fuzzy inference, alpha_a u_a,f", "proportional"),
-    "none": AuthorityEntry("no limit: u_a,f drives", "none"),
-    "driver_only": AuthorityEntry("no automation", "driver_only"),
+    "paper": AuthorityEntry("fuzzy inference, Eq. 10", "paper", FuzzyAuthority),
+    "proportional": AuthorityEntry("fuzzy inference, alpha_a u_a,f", "proportional", FuzzyAuthority),
+    "none": AuthorityEntry("no limiter and no display: u_a,f drives", "none", partial(FixedAuthority, 1.0)),
+    "display": AuthorityEntry("fuzzy inference displayed to the driver, but no limit", "none", FuzzyAuthority),
+    "driver_only": AuthorityEntry("no automation", "driver_only", partial(FixedAuthority, 0.0)),
     "fixed": AuthorityEntry("alpha_a = 0.5, alpha_a u_a,f", "proportional", partial(FixedAuthority, 0.5)),
     "linear": AuthorityEntry("1 - the larger risk, alpha_a u_a,f", "proportional", LinearAuthority),
     "softmax": AuthorityEntry("softmax of the risk, alpha_a u_a,f", "proportional", SoftmaxAuthority),
     "takeover": AuthorityEntry("all or nothing with hysteresis, alpha_a u_a,f", "proportional", HardTakeover),
     "time_based": AuthorityEntry("by TTC and time to lane crossing, alpha_a u_a,f", "proportional", TimeBasedAuthority),
+    "safehil": AuthorityEntry("by the growth of risk under either command", "proportional", SafeHIL),
+    "safehil_growing": AuthorityEntry(
+        "safehil, where only a growing risk counts", "proportional", partial(SafeHIL, growing=True)
+    ),
+    "barrier": AuthorityEntry("as much of each channel as barrier functions allow", "proportional", BarrierAuthority),
+    "predictive_filter": AuthorityEntry("as much as leaves a simulated way back", "proportional", PredictiveFilter),
+    "guardian": AuthorityEntry("barrier, with the alerts of residual", "proportional", Guardian),
+    "learned": AuthorityEntry("trained beside the population, alpha_a u_a,f", "proportional", learned_allocator),
+    "intent": AuthorityEntry("agreement with what the driver wants, by channel", "proportional", IntentAuthority),
+    "residual": AuthorityEntry(
+        "CUSUM of what the scene does not explain, by channel, with alerts", "proportional", ResidualAuthority
+    ),
 }
 """Authorities by name."""
 
@@ -254,9 +272,8 @@ def chosen_authorities(given: Authorities) -> dict[str, AuthorityEntry]:
         )
         if made.law not in LAWS:
             raise ValueError(f"authority {name!r} has law = {made.law!r}; {hint(made.law, LAWS)}")
-        if made.make is not None:
-            label = f"authority {name!r}"
-            check_reset(_check_maker(label, made.make, Allocator, "reset(seed) and allocate(scene, signals)"), label)
+        label = f"authority {name!r}"
+        check_reset(_check_maker(label, made.make, Allocator, "reset(seed) and allocate(scene, signals)"), label)
         entries[name] = made
     return entries
 

@@ -10,21 +10,22 @@ from importlib.metadata import version
 from pathlib import Path
 from platform import python_version
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 import shared_control_env
-from shared_control_env.controllers.allocators import Allocator, checked_authority
+from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, decide, hide, in_kernel
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.parameters import PERSONS, TRAFFIC_BODY
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
 from shared_control_env.envs.scenarios import SCENARIOS
-from shared_control_env.envs.settings import Settings, change, defaults, plain
+from shared_control_env.envs.settings import Settings, change, combined, defaults, plain
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
 from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
 from shared_control_env.evaluation.metrics import Trajectory, measure_all
+from shared_control_env.evaluation.severity import GradedFault
 from shared_control_env.vector.environment import SharedControlVectorEnv
 
 LARGEST_BATCH = 170
@@ -40,6 +41,9 @@ AS_GIVEN = "own"
 """Name in the table for the degradation that the scenario itself has."""
 
 
+Fault: TypeAlias = "str | GradedFault | None"
+
+
 class EpisodeBatch(NamedTuple):
     """Episodes that differ only in degradation and seed.
 
@@ -47,17 +51,20 @@ class EpisodeBatch(NamedTuple):
         scenario: key of :data:`envs.scenarios.SCENARIOS`.
         driver: name and entry of the driver.
         authority: name and entry of the authority.
-        episodes: degradation (None for the scenario's own) and seed of each episode.
+        episodes: fault and seed of each episode. The fault is the name of a degradation, a
+            :class:`~shared_control_env.evaluation.severity.GradedFault`, or None for the scenario's own.
         config: changes to the scenario's settings.
         automation: makes a user-defined automation for each environment; None for the predictive controller.
+        twins: whether the same episodes without a fault are run too, with which detection is measured.
     """
 
     scenario: str
     driver: tuple[str, DriverEntry]
     authority: tuple[str, AuthorityEntry]
-    episodes: tuple[tuple[str | None, int], ...]
+    episodes: tuple[tuple[Fault, int], ...]
     config: Mapping[str, Any]
     automation: Callable[[], Planner] | None = None
+    twins: bool = True
 
     @property
     def key(self) -> str:
@@ -92,12 +99,12 @@ def plan(
                     yield EpisodeBatch(scenario, driver, authority, part, config, automation)
 
 
-def settings_of(batch: EpisodeBatch, degradation: str | None) -> dict[str, Any]:
+def settings_of(batch: EpisodeBatch, degradation: Fault) -> dict[str, Any]:
     """Changes to the scenario's settings for one episode of a batch.
 
     Args:
         batch: the batch.
-        degradation: degradation of the episode; None for the scenario's own.
+        degradation: fault of the episode; None for the scenario's own.
 
     Raises:
         ValueError: if two of authority, suite, driver and the user's config disagree on one setting.
@@ -108,7 +115,9 @@ def settings_of(batch: EpisodeBatch, degradation: str | None) -> dict[str, Any]:
         (driver, entry.config),
         ("config", batch.config),
     ]
-    if degradation is not None:
+    if isinstance(degradation, GradedFault):
+        parts.insert(1, (f"the fault {degradation.label!r}", degradation.settings()))
+    elif degradation is not None:
         parts.insert(1, ("the suite", {"degradations": [degradation]}))
     config: dict[str, Any] = {}
     owners: dict[str, tuple[str, Any]] = {}
@@ -123,10 +132,24 @@ def settings_of(batch: EpisodeBatch, degradation: str | None) -> dict[str, Any]:
     for draw in given if isinstance(given, list) else ():
         if isinstance(draw, Mapping) and isinstance(draw.get("setting"), str):
             _refuse_clash(owners, "config", draw["setting"], DRAWN)
-    if entry.draws:
+    draws = (*entry.draws, *(degradation.draws() if isinstance(degradation, GradedFault) else ()))
+    if draws:
         default = defaults(SCENARIOS[batch.scenario].settings)
-        config["randomise"] = [*change(default, batch.config)["randomise"], *entry.draws]
+        config["randomise"] = [*change(default, batch.config)["randomise"], *draws]
     return config
+
+
+def without_fault(batch: EpisodeBatch, fault: Fault) -> dict[str, Any]:
+    """Changes to the scenario's settings for the twin of an episode: the same but for the fault.
+
+    Args:
+        batch: the batch.
+        fault: fault of the episode.
+    """
+    if isinstance(fault, str) or (fault is None and combined(SCENARIOS[batch.scenario].settings, {}).degradations):
+        return settings_of(batch, "none")  # which draws as many random numbers as every other degradation
+    config = settings_of(batch, None)
+    return {**config, "faults": [], "degradations": []}
 
 
 DRAWN = "a draw"
@@ -179,24 +202,42 @@ def versions() -> str:
     return ", ".join(["python " + python_version(), *parts, f"sources {source_digest()}"])
 
 
-def make_environment(batch: EpisodeBatch, render_mode: str | None = None) -> Any:
-    """Environment for the episodes of a batch. Slots are bound if their driver or allocator runs in the kernel.
+def bound_allocator(batch: EpisodeBatch) -> bool | Allocator:
+    """The allocator that the environments of a batch bind; False if it decides from outside.
 
     Args:
         batch: the batch.
+    """
+    allocator = batch.authority[1].make()
+    if batch.automation is None:
+        return allocator if in_kernel(allocator) else False
+    return isinstance(allocator, FuzzyAuthority) and allocator.operators is None
+
+
+def make_environment(batch: EpisodeBatch, n: int, render_mode: str | None = None) -> Any:
+    """Environments for n episodes of a batch. Slots are bound if their driver or allocator runs in the kernel.
+
+    Args:
+        batch: the batch.
+        n: number of environments.
         render_mode: ``rgb_array`` or None.
     """
-    limiter, driver = batch.authority[1].make is None, batch.driver[1].make is None
+    limiter, driver = bound_allocator(batch), batch.driver[1].make is None
     if batch.automation is not None:
         from shared_control_env.evaluation.one_by_one import SingleEnvironments  # needs highway-env
 
-        automations = [batch.automation() for _ in batch.episodes]
+        automations = [batch.automation() for _ in range(n)]
         return SingleEnvironments(
-            batch.scenario, automations, settings_of(batch, None), limiter, driver, render_mode=render_mode
+            batch.scenario,
+            automations,
+            settings_of(batch, None),
+            bool(limiter),
+            driver,
+            render_mode=render_mode,
         )
     return SharedControlVectorEnv(
         SCENARIOS[batch.scenario],
-        len(batch.episodes),
+        n,
         config=settings_of(batch, None),
         limiter=limiter,
         driver=driver,
@@ -220,23 +261,27 @@ class Recorder:
         response: time from noticing to acting of a person at rest [s], 0 for other drivers, shape (n,).
     """
 
-    SIGNALS = ("z", "y_target", "v_target", "u", "u_h_act", "u_a_act", "alpha_a", "neighbours", "fault_active")
+    STATES = ("z", "y_target", "v_target", "neighbours")
+    """Signals whose last value is that of the state in which the episode ends."""
+
+    SIGNALS = (*STATES, "u", "u_h_act", "u_a_act", "alpha_a", "alert", "fault_active")
 
     def __init__(self, steps: int, n: int) -> None:
         self._values: dict[str, np.ndarray] = {}
-        self._shape = (steps, n)
+        self._shape = (steps + 1, n)
         self.lengths = np.full(n, steps)
         self.crashed, self.left_road = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         self.failures, self.noticed, self.response = np.zeros(n, dtype=int), np.full(n, np.nan), np.zeros(n)
         self._running = np.ones(n, dtype=bool)
 
-    def note(self, k: int, infos: Mapping[str, Any], ended: np.ndarray) -> bool:
+    def note(self, k: int, infos: Mapping[str, Any], ended: np.ndarray, scenes: np.ndarray) -> bool:
         """Record the signals of one step, and the ends of episodes.
 
         Args:
             k: index of the time step.
             infos: infos of all environments.
             ended: whether the episode of each environment has ended, shape (n,).
+            scenes: scenes after the step, records of :data:`core.records.SCENE`, shape (n,).
 
         Returns:
             Whether any episode is still running.
@@ -245,7 +290,7 @@ class Recorder:
             value = np.asarray(infos[name])
             if name not in self._values:
                 self._values[name] = np.zeros((*self._shape, *value.shape[1:]), value.dtype)
-            self._values[name][k] = value
+            self._values[name][k, self._running] = value[self._running]
         failures = infos["automation"]["failures"] + (infos["driver"]["failures"] if "driver" in infos else 0)
         self.failures[self._running] = failures[self._running]
         if "driver" in infos:
@@ -255,27 +300,39 @@ class Recorder:
             self.noticed[seen] = noticed[seen]
         over = self._running & ended
         self.lengths[over] = k + 1
+        for name in self.STATES:
+            self._values[name][k + 1, over] = scenes[name][over]
         self.crashed[over], self.left_road[over] = infos["crashed"][over], ~infos["on_road"][over]
         self._running &= ~ended
         return bool(self._running.any())
 
-    def trajectory(self, i: int, settings: Any, wall_time: float) -> Trajectory:
+    def trajectory(self, i: int, settings: Any, wall_time: float, twin: int | None = None) -> Trajectory:
         """The trajectory of one episode.
 
         Args:
             i: index of the episode.
             settings: settings of the episode.
             wall_time: computing time of the episode [s].
+            twin: index of the same episode without a fault; None if it was not run.
         """
-        value = {name: array[: self.lengths[i], i] for name, array in self._values.items()}
+        T = self.lengths[i]
+        value = {name: array[: T + (name in self.STATES), i] for name, array in self._values.items()}
+        sound = np.full(T, np.nan)
+        if twin is not None:
+            both = min(T, self.lengths[twin])
+            sound[:both] = self._values["alpha_a"][:both, twin]
         limits = np.array([settings.limits.a_max, settings.limits.delta_max])
         ahead = value["neighbours"][:, PRECEDING]
         gap = ahead[:, NEAR_S] - value["z"][:, 0] - 0.5 * (settings.vehicle.length + TRAFFIC_BODY[0])
         present = ahead[:, PRESENT] > 0.0
+        gap = np.where(present, gap, np.inf)
+        if self.crashed[i]:
+            gap[-1] = 0.0
         return Trajectory(
             dt=1.0 / settings.policy_frequency,
             lateral_error=value["z"][:, 1] - value["y_target"],
             lane_width=settings.road.lane_width,
+            body_width=settings.vehicle.width,
             speed=value["z"][:, 3],
             target_speed=value["v_target"],
             lateral_speed=value["z"][:, 4],
@@ -283,11 +340,13 @@ class Recorder:
             command=value["u"] / limits,
             delta_max=settings.limits.delta_max,
             a_max=settings.limits.a_max,
-            gap=np.where(present, gap, np.inf),
+            gap=gap,
             lead_speed=np.where(present, ahead[:, NEAR_SPEED], 0.0),
             driver=value["u_h_act"] / limits,
             automation=value["u_a_act"] / limits,
             authority=value["alpha_a"],
+            sound_authority=sound,
+            alert=value["alert"] > 0,
             degraded=value["fault_active"],
             crashed=bool(self.crashed[i]),
             left_road=bool(self.left_road[i]),
@@ -301,19 +360,20 @@ class Policies:
 
     Args:
         batch: the batch.
-        env: environment of the batch, after its reset.
+        seeds: seed of each environment.
+        env: environments of the batch, after their reset.
     """
 
-    def __init__(self, batch: EpisodeBatch, env: Any) -> None:
-        self._scenes, self._signals = env.views()
+    def __init__(self, batch: EpisodeBatch, seeds: Sequence[int], env: Any) -> None:
+        self._env, self._scenes = env, env.views()
         self._limits = np.array([[each.limits.a_max, each.limits.delta_max] for each in env.episodes])
         make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
+        bound = bool(bound_allocator(batch))
         self._names = f"driver {batch.driver[0]!r}", f"authority {batch.authority[0]!r}"
-        self._drivers: list[Driver] = [make_driver() for _ in batch.episodes] if make_driver else []
-        self._allocators: list[Allocator] = [make_allocator() for _ in batch.episodes] if make_allocator else []
-        for (_, seed), *policies in zip(
-            batch.episodes, *(each for each in (self._drivers, self._allocators) if each), strict=True
-        ):
+        self._drivers: list[Driver] = [make_driver() for _ in seeds] if make_driver else []
+        self._allocators: list[Allocator] = [] if bound else [make_allocator() for _ in seeds]
+        self._assessors = [] if bound else env.assessors()
+        for seed, *policies in zip(seeds, *(each for each in (self._drivers, self._allocators) if each), strict=True):
             for policy in policies:
                 policy.reset(seed=seed)
 
@@ -334,12 +394,23 @@ class Policies:
             ]
             action[DRIVER] = np.clip(np.array(commands) / self._limits, -1.0, 1.0)
         if self._allocators:
-            alphas = [
-                checked_authority(a.allocate(scene, signals), self._names[1])
-                for a, scene, signals in zip(self._allocators, self._scenes, self._signals, strict=True)
-            ]
-            action[AUTHORITY] = np.array(alphas, dtype=float)[:, None]
+            shown = self._env.signals_for_allocators()
+            hide(shown, self._allocators[0])
+            alphas, alerts = zip(
+                *(
+                    decide(*each, self._names[1])
+                    for each in zip(self._allocators, self._scenes, _records(shown), self._assessors, strict=True)
+                ),
+                strict=True,
+            )
+            self._env.show_alerts(np.array(alerts))
+            action[AUTHORITY] = np.array(alphas)
         return action if len(action) != 1 else next(iter(action.values()))
+
+
+def _records(array: np.ndarray) -> list[np.ndarray]:
+    """The records of an array, each as a 0-d array."""
+    return [array[i : i + 1].reshape(()) for i in range(len(array))]
 
 
 def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dict[str, Any]]:
@@ -354,28 +425,32 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
         time and the time at which a person at rest noticed something [s], all metrics, and the versions.
     """
     begin = perf_counter()
-    env = make_environment(batch, None if frames is None else "rgb_array")
-    seeds = [seed for _, seed in batch.episodes]
-    changes = {degradation: settings_of(batch, degradation) for degradation, _ in batch.episodes}
-    configs = [changes[degradation] for degradation, _ in batch.episodes]
+    n = len(batch.episodes)
+    changes = {fault: settings_of(batch, fault) for fault, _ in batch.episodes}
+    configs, seeds = [changes[fault] for fault, _ in batch.episodes], [seed for _, seed in batch.episodes]
+    twins, added = _twins(batch)
+    for fault, seed in added:
+        configs.append(without_fault(batch, fault))
+        seeds.append(seed)
+    env = make_environment(batch, len(seeds), None if frames is None else "rgb_array")
     observations, _ = env.reset(seed=seeds, options={"config": configs})
     drawn = env.episodes
     steps = max(episode.steps for episode in drawn)  # they are equal in the kernel
-    recorder, policies = Recorder(steps, len(batch.episodes)), Policies(batch, env)
+    recorder, policies = Recorder(steps, len(seeds)), Policies(batch, seeds, env)
     for k in range(steps):
         if frames is not None:
-            frames.extend(env.render() or ())
+            frames.extend((env.render() or ())[:n])
         action = policies.decide(observations)
         observations, _, terminations, truncations, infos = env.step(action)
-        if not recorder.note(k, infos, terminations | truncations):
+        if not recorder.note(k, infos, terminations | truncations, env.scenes):
             break
     env.close()
-    wall_time = (perf_counter() - begin) / len(batch.episodes)
+    wall_time = (perf_counter() - begin) / len(seeds)
     made_with = versions()
     return [
         {
             "scenario": batch.scenario,
-            "degradation": degradation or AS_GIVEN,
+            "degradation": name_of(fault),
             "driver": batch.driver[0],
             "authority": batch.authority[0],
             "seed": seed,
@@ -385,13 +460,63 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
             "person": person_of(drawn[i]),
             "response": recorder.response[i],
             "noticed": recorder.noticed[i],
-            **measure_all(recorder.trajectory(i, drawn[i], wall_time)),
+            **fault_of(drawn[i]),
+            **measure_all(recorder.trajectory(i, drawn[i], wall_time, twins.get((fault, seed)))),
             "config_hash": config_hash(batch.scenario, configs[i]),
             "version": version("shared_control_env"),
             "versions": made_with,
         }
-        for i, (degradation, seed) in enumerate(batch.episodes)
+        for i, (fault, seed) in enumerate(batch.episodes)
     ]
+
+
+def name_of(fault: Fault) -> str:
+    """Name of a fault in the tables.
+
+    Args:
+        fault: fault of an episode.
+    """
+    return fault.label if isinstance(fault, GradedFault) else fault or AS_GIVEN
+
+
+def _twins(batch: EpisodeBatch) -> tuple[dict[tuple[Fault, int], int], list[tuple[Fault, int]]]:
+    """Index of the environment that runs the twin of each episode with a fault, and the episodes to run a twin of.
+
+    Episodes of the batch without a fault are twins themselves; the others come after the episodes of the batch.
+    """
+    twins: dict[tuple[Fault, int], int] = {}
+    added: list[tuple[Fault, int]] = []
+    if not batch.twins:
+        return twins, added
+    sound = {seed: i for i, (fault, seed) in enumerate(batch.episodes) if fault == "none"}
+    for fault, seed in batch.episodes:
+        if fault == "none":
+            continue
+        if seed not in sound:
+            sound[seed] = len(batch.episodes) + len(added)
+            added.append((fault, seed))
+        twins[fault, seed] = sound[seed]
+    return twins, added
+
+
+def fault_of(settings: Settings) -> dict[str, Any]:
+    """Kind, channel, size, onset [s] and duration [s] of an episode's first fault; empty or NaN without one.
+
+    Args:
+        settings: settings of one episode.
+    """
+    if not settings.faults:
+        return {"fault_kind": "", "fault_channel": "", **dict.fromkeys(_OF_A_FAULT, np.nan)}
+    first = settings.faults[0]
+    numbers = (first.size, first.onset, first.duration)
+    return {
+        "fault_kind": first.kind,
+        "fault_channel": first.channel,
+        **dict(zip(_OF_A_FAULT, (np.nan if each is None else each for each in numbers), strict=True)),
+    }
+
+
+_OF_A_FAULT = ("fault_size", "fault_onset", "fault_duration")
 
 
 def person_of(settings: Settings) -> str:

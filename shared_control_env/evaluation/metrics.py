@@ -22,8 +22,11 @@ JERK_WINDOW = 0.5
 REVERSAL_GAP = np.radians(0.2)
 """Smallest change of the front steering angle that counts as a reversal [rad]: 3 degrees at the wheel, ratio 16."""
 
-DETECTION_LEVEL = 0.8
-"""Authority alpha_a below which a degradation counts as detected [-]."""
+DETECTION_LOSS = 0.2
+"""Authority alpha_a that must be lost, against the same episode without a fault, to count as a detection [-]."""
+
+EXPOSED_TTC = 3.0
+"""Time to collision below which the car counts as exposed [s]; ours, within the 1.5 to 4 s that are in use."""
 
 RECOVERED = 0.5
 """Lateral error within which the car counts as recovered [m]."""
@@ -31,23 +34,27 @@ RECOVERED = 0.5
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Signals of one episode at its T time steps, and its end.
+    """Signals of one episode of T time steps. States have one more row: the last is the state in which it ends.
 
     Attributes:
         dt: time step [s].
-        lateral_error: y - y_target, shape (T,) [m].
+        lateral_error: y - y_target, shape (T + 1,) [m].
         lane_width: width of a lane [m].
-        speed: longitudinal speed v_x, shape (T,) [m/s].
-        target_speed: target speed, shape (T,) [m/s].
-        lateral_speed: lateral velocity v_y in the body frame, shape (T,) [m/s].
-        yaw_rate: yaw rate r, shape (T,) [rad/s].
+        body_width: width of the ego's body [m].
+        speed: longitudinal speed v_x, shape (T + 1,) [m/s].
+        target_speed: target speed, shape (T + 1,) [m/s].
+        lateral_speed: lateral velocity v_y in the body frame, shape (T + 1,) [m/s].
+        yaw_rate: yaw rate r, shape (T + 1,) [rad/s].
         command: command u of the vehicle, ``[a, delta]`` as shares of the limits, shape (T, 2) [-].
         delta_max: limit of the steering angle [rad].
         a_max: limit of the acceleration [m/s^2].
-        gap: gap to the vehicle ahead in the lane, bumper to bumper; inf without one, shape (T,) [m].
-        lead_speed: speed of the vehicle ahead, shape (T,) [m/s].
+        gap: gap to the vehicle ahead in the lane, bumper to bumper; inf without one, shape (T + 1,) [m]. After a
+            collision the last entry is 0: the gap to the vehicle that was hit, wherever it was.
+        lead_speed: speed of the vehicle ahead, shape (T + 1,) [m/s].
         driver, automation: actual commands u_h,act and u_a,act as shares of the limits, shape (T, 2) [-].
         authority: alpha_a, shape (T,) [-].
+        sound_authority: alpha_a of the same episode without a fault, shape (T,) [-]; NaN where that is not known.
+        alert: whether the driver is alerted, shape (T,).
         degraded: whether a degradation is active, shape (T,).
         crashed, left_road: whether the episode ended in a collision, or off the road.
         solver_failures: number of steps at which a solver of automation or driver failed, so that its last command was
@@ -58,6 +65,7 @@ class Trajectory:
     dt: float
     lateral_error: np.ndarray
     lane_width: float
+    body_width: float
     speed: np.ndarray
     target_speed: np.ndarray
     lateral_speed: np.ndarray
@@ -70,6 +78,8 @@ class Trajectory:
     driver: np.ndarray
     automation: np.ndarray
     authority: np.ndarray
+    sound_authority: np.ndarray
+    alert: np.ndarray
     degraded: np.ndarray
     crashed: bool
     left_road: bool
@@ -101,6 +111,7 @@ class Metric(NamedTuple):
 IDENTITY = (
     *("scenario", "degradation", "driver", "authority", "seed", "terminated", "duration"),
     *("K_h", "T_h", "person", "response", "noticed"),
+    *("fault_kind", "fault_channel", "fault_size", "fault_onset", "fault_duration"),
     *("config_hash", "version", "versions"),
 )
 """Columns of the table that are no metrics."""
@@ -147,8 +158,13 @@ def measure_all(trajectory: Trajectory) -> dict[str, float]:
     return {name: float(entry.measure(trajectory)) for name, entry in METRICS.items()}
 
 
+def _room(t: Trajectory) -> np.ndarray:
+    """Distance from the body's edge to the nearer line of the lane to keep, taken as parallel to it, (T + 1,) [m]."""
+    return 0.5 * (t.lane_width - t.body_width) - np.abs(t.lateral_error)
+
+
 def _out_of_lane(t: Trajectory) -> np.ndarray:
-    return np.abs(t.lateral_error) > 0.5 * t.lane_width
+    return _room(t) < 0.0
 
 
 @metric("-", "lower")
@@ -163,17 +179,29 @@ def road_departures(t: Trajectory) -> float:
     return float(t.left_road)
 
 
+@metric("-", "higher")
+def controlled(t: Trajectory) -> float:
+    """1 if from the onset on there is no collision and the body stays on the road and in the lane to keep, else 0."""
+    return float(not (t.crashed or t.left_road or _out_of_lane(t)[t.onset or 0 :].any()))
+
+
+@metric("m", "higher")
+def lane_room_min(t: Trajectory) -> float:
+    """Smallest distance from the body's edge to the nearer line of the lane to keep; negative beyond the line."""
+    return float(_room(t).min())
+
+
 @metric("-", "lower")
 def lane_departures(t: Trajectory) -> float:
-    """Number of times that the centre of mass leaves the lane to keep: |y - y_target| rises over half a lane width."""
+    """Number of times that the body's edge crosses a line of the lane to keep outwards."""
     out = _out_of_lane(t)
     return float(np.count_nonzero(out[1:] & ~out[:-1]) + out[0])
 
 
 @metric("s", "lower")
 def time_out_of_lane(t: Trajectory) -> float:
-    """Time with the centre of mass outside the lane to keep."""
-    return float(_out_of_lane(t).sum() * t.dt)
+    """Time with the body's edge beyond a line of the lane to keep."""
+    return float(_out_of_lane(t)[1:].sum() * t.dt)
 
 
 @metric("m", "lower")
@@ -190,7 +218,7 @@ def lateral_rms(t: Trajectory) -> float:
 
 @metric("m", "higher")
 def min_gap(t: Trajectory) -> float:
-    """Smallest gap to the vehicle ahead in the lane, bumper to bumper; not defined without one."""
+    """Smallest gap to the vehicle ahead in the lane, bumper to bumper; 0 in a collision; not defined without one."""
     return float(t.gap.min()) if np.isfinite(t.gap).any() else np.nan
 
 
@@ -206,38 +234,64 @@ def _closing(t: Trajectory) -> np.ndarray:
     return np.isfinite(t.gap) & (t.speed - t.lead_speed > 0.1)
 
 
+def _ttc(t: Trajectory) -> np.ndarray:
+    """Time to collision with the vehicle ahead, infinite where the gap does not shrink, shape (T + 1,) [s]."""
+    ttc, closing = np.full(len(t.gap), np.inf), _closing(t)
+    ttc[closing] = np.maximum(t.gap, 0.0)[closing] / (t.speed - t.lead_speed)[closing]
+    if t.crashed:
+        ttc[-1] = 0.0
+    return ttc
+
+
 @metric("s", "higher")
 def min_ttc(t: Trajectory) -> float:
-    """Smallest time to collision: the gap over the closing speed, while that is above 0.1 m/s."""
-    closing = _closing(t)
-    if not closing.any():
-        return np.nan
-    return float((np.maximum(t.gap, 0.0)[closing] / (t.speed - t.lead_speed)[closing]).min())
+    """Smallest time to collision: the gap over the closing speed, while that is above 0.1 m/s; 0 in a collision."""
+    ttc = _ttc(t)
+    return float(ttc.min()) if np.isfinite(ttc).any() else np.nan
+
+
+@metric("s", "lower")
+def exposed_time(t: Trajectory) -> float:
+    """Time with a time to collision below 3 s (TET; Minderhoud & Bovy 2001)."""
+    return float((_ttc(t)[1:] < EXPOSED_TTC).sum() * t.dt)
+
+
+@metric("s^2", "lower")
+def exposed_time_integral(t: Trajectory) -> float:
+    """Integral over time of 3 s minus the time to collision, while that is below 3 s (TIT; Minderhoud & Bovy 2001)."""
+    return float(np.maximum(EXPOSED_TTC - _ttc(t)[1:], 0.0).sum() * t.dt)
 
 
 @metric("m/s^2", "lower")
 def max_drac(t: Trajectory) -> float:
-    """Largest deceleration rate to avoid a crash, closing speed squared over twice the gap; 0 if it never closes."""
+    """Largest deceleration rate to avoid a crash, closing speed squared over twice the gap, before a collision."""
     closing = _closing(t)
+    closing[-1] &= not t.crashed
     if not closing.any():
         return 0.0
     rate = (t.speed - t.lead_speed)[closing] ** 2 / (2.0 * np.maximum(t.gap[closing], 0.1))
     return float(rate.max())
 
 
+def _detected(t: Trajectory) -> np.ndarray | None:
+    """Whether the fault costs authority at each step from the onset on; None without an onset or a comparison."""
+    if t.onset is None or np.isnan(t.sound_authority).all():
+        return None
+    return (t.sound_authority - t.authority)[t.onset :] > DETECTION_LOSS
+
+
 @metric("s", "lower")
 def time_to_detect(t: Trajectory) -> float:
-    """Time from the onset until alpha_a first lies below 0.8; not defined without an onset or if it never does."""
-    if t.onset is None:
-        return np.nan
-    low = t.authority[t.onset :] < DETECTION_LEVEL
-    return float(np.argmax(low) * t.dt) if low.any() else np.nan
+    """Time from the onset until alpha_a first lies 0.2 below that of the same episode without a fault, if it does."""
+    low = _detected(t)
+    return float(np.argmax(low) * t.dt) if low is not None and low.any() else np.nan
 
 
 @metric("-", "lower")
 def missed_detection(t: Trajectory) -> float:
-    """1 if alpha_a never lies below 0.8 from the onset on, else 0; not defined without an onset."""
-    return float(not (t.authority[t.onset :] < DETECTION_LEVEL).any()) if t.onset is not None else np.nan
+    """1 if alpha_a never lies 0.2 below that of the same episode without a fault, else 0; needs an onset."""
+    low = _detected(t)
+    return float(not low.any()) if low is not None else np.nan
 
 
 @metric("-", "lower")
@@ -245,6 +299,21 @@ def false_authority_loss(t: Trajectory) -> float:
     """Mean of 1 - alpha_a before the onset, or over the whole episode without one."""
     healthy = t.authority[: t.onset]
     return float(np.mean(1.0 - healthy)) if len(healthy) else np.nan
+
+
+@metric("-", "lower")
+def false_alert(t: Trajectory) -> float:
+    """Share of the time before the onset, or of the whole episode without one, with an alert to the driver."""
+    healthy = t.alert[: t.onset]
+    return float(np.mean(healthy)) if len(healthy) else np.nan
+
+
+@metric("s", "lower")
+def time_to_alert(t: Trajectory) -> float:
+    """Time from the onset to the first alert to the driver; not defined without an onset or an alert."""
+    if t.onset is None or not t.alert[t.onset :].any():
+        return np.nan
+    return float(np.argmax(t.alert[t.onset :]) * t.dt)
 
 
 @metric("-", "neither")
@@ -289,7 +358,7 @@ def steering_reversal_rate(t: Trajectory) -> float:
 
 
 def _lateral_acceleration(t: Trajectory) -> np.ndarray:
-    """Mean lateral acceleration of every time step but the last, v_y' + v_x r, shape (T - 1,) [m/s^2].
+    """Mean lateral acceleration of every time step, v_y' + v_x r, shape (T,) [m/s^2].
 
     v_x r alone is the lateral acceleration in steady cornering only; where the car yaws under steering that alternates,
     it is several times what the tyres can transmit.
@@ -300,9 +369,8 @@ def _lateral_acceleration(t: Trajectory) -> np.ndarray:
 
 @metric("m/s^2", "lower")
 def lateral_acceleration_max(t: Trajectory) -> float:
-    """Largest |v_y' + v_x r|, averaged over a time step; ISO 11270 allows 3 m/s^2; not defined for a single step."""
-    lateral = np.abs(_lateral_acceleration(t))
-    return float(lateral.max()) if len(lateral) else np.nan
+    """Largest |v_y' + v_x r|, averaged over a time step; ISO 11270 allows 3 m/s^2."""
+    return float(np.abs(_lateral_acceleration(t)).max())
 
 
 def _lateral_jerk(t: Trajectory) -> np.ndarray:
@@ -325,7 +393,7 @@ def iso_11270_violation(t: Trajectory) -> float:
     beyond = np.abs(_lateral_acceleration(t)) > LATERAL_ACCELERATION_LIMIT
     jerk = _lateral_jerk(t) > LATERAL_JERK_LIMIT
     beyond[len(beyond) - len(jerk) :] |= jerk
-    return float(beyond.mean()) if len(beyond) else np.nan
+    return float(beyond.mean())
 
 
 @metric("m/s^3", "lower")
@@ -363,7 +431,7 @@ def solver_failures(t: Trajectory) -> float:
 @metric("-", "higher")
 def real_time_factor(t: Trajectory) -> float:
     """Simulated time over computing time, of the batch that the episode ran in; it differs from run to run."""
-    return len(t.lateral_error) * t.dt / t.wall_time
+    return len(t.command) * t.dt / t.wall_time
 
 
 STANDARD = tuple(METRICS)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.controllers.arrays import read_only
+from shared_control_env.controllers.assessor import Assessor
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.envs.settings import Settings
 from shared_control_env.wrappers import DriverModel
@@ -52,10 +53,31 @@ class SingleEnvironments:
         """Settings of each episode, with all random values drawn."""
         return tuple(env.unwrapped.episode for env in self._envs)
 
-    def views(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Scenes and signals as lists of read-only 0-d records, which always show the present step."""
-        bare = [env.unwrapped for env in self._envs]
-        return [read_only(env.scene) for env in bare], [read_only(env.signals) for env in bare]
+    def views(self) -> list[np.ndarray]:
+        """Scenes as read-only 0-d records, which always show the present step."""
+        return [read_only(env.unwrapped.scene) for env in self._envs]
+
+    @property
+    def scenes(self) -> np.ndarray:
+        """The perceived scene of each environment, records of :data:`core.records.SCENE`, shape (N,)."""
+        return np.array([env.unwrapped.scene for env in self._envs])
+
+    def signals_for_allocators(self) -> np.ndarray:
+        """Signals with each driver's present u_h,act, records of :data:`core.records.SIGNALS`, shape (N,)."""
+        return np.array([env.unwrapped.signals_for_allocator() for env in self._envs])
+
+    def assessors(self) -> list[Assessor]:
+        """Answers to allocators' questions about the present step of each environment."""
+        return [env.unwrapped.assessor for env in self._envs]
+
+    def show_alerts(self, alerts: np.ndarray) -> None:
+        """Show each driver the alert of an allocator.
+
+        Args:
+            alerts: indices in :data:`core.authority.alerts.ALERTS`, shape (N,).
+        """
+        for env, alert in zip(self._envs, alerts, strict=True):
+            env.unwrapped.signals["alert"] = alert
 
     def reset(self, *, seed: Sequence[int], options: Mapping[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin an episode in each environment.

@@ -14,7 +14,7 @@ import numpy as np
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.evaluation.additions import additions, described
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
-from shared_control_env.evaluation.episodes import EpisodeBatch, run, versions
+from shared_control_env.evaluation.episodes import EpisodeBatch, Fault, run, versions
 from shared_control_env.evaluation.fingerprint import fingerprint
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import read_manifest
@@ -27,7 +27,7 @@ def replay_episode(
     scenario: str,
     driver: tuple[str, DriverEntry],
     authority: tuple[str, AuthorityEntry],
-    degradation: str | None,
+    degradation: Fault,
     seed: int,
     frames: list[np.ndarray] | None = None,
     config: Mapping[str, Any] | None = None,
@@ -38,7 +38,8 @@ def replay_episode(
     Args:
         scenario: key of :data:`envs.scenarios.SCENARIOS`.
         driver, authority: name and entry.
-        degradation: key of :data:`envs.degradations.DEGRADATIONS`; None for the scenario's own.
+        degradation: key of :data:`envs.degradations.DEGRADATIONS`, or a
+            :class:`~shared_control_env.evaluation.severity.GradedFault`; None for the scenario's own.
         seed: seed of the episode.
         frames: list to which pictures of every step are appended; None for no pictures.
         config: changes to the scenario's settings, as in the benchmark.

@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from shared_control_env.evaluation.statistics import STATISTICS, Interval, intervals
+from shared_control_env.evaluation.statistics import STATISTICS, Interval, intervals_of_pairs
 from shared_control_env.evaluation.storage import MAY_GROW, write_atomically
 
 if TYPE_CHECKING:
@@ -102,8 +102,8 @@ def write_report(
         folder: folder of the results, which the replay commands refer to; None without one.
     """
     environment = Environment(loader=PackageLoader("shared_control_env.evaluation", "."), autoescape=True)
-    environment.filters["number"] = _number
-    rows = summarise(table, metrics) if len(table) else []
+    environment.filters["number"] = number
+    rows = rows_of(table, metrics) if len(table) else []
     page = environment.get_template("report.html.j2").render(
         episodes=len(table),
         metrics=metrics,
@@ -116,21 +116,15 @@ def write_report(
     write_atomically(path, lambda draft: draft.write_text(page, encoding="utf-8"))
 
 
-def summarise(table: pd.DataFrame, metrics: Mapping[str, Metric]) -> list[Row]:
+def rows_of(table: pd.DataFrame, metrics: Mapping[str, Metric]) -> list[Row]:
     """Rows of the report's table: every pair of authority and driver with all metrics.
 
     Args:
         table: one row per episode.
         metrics: metrics of the table by name.
     """
-    rng = np.random.default_rng(0)
-    found: dict[tuple[str, str], dict[str, dict[str, Interval]]] = {}
-    sizes = {}
-    for (authority, driver), part in table.groupby(["authority", "driver"], sort=False):
-        strata = part.groupby(["scenario", "degradation"]).ngroup().to_numpy()
-        pair = str(authority), str(driver)
-        sizes[pair] = len(part)
-        found[pair] = intervals({name: part[name].to_numpy(dtype=float) for name in metrics}, strata, rng)
+    found = intervals_of_pairs(table, metrics)
+    sizes = table.groupby(["authority", "driver"]).size()
     bests = {
         (name, statistic): _best([pair[name][statistic] for pair in found.values()], metrics[name].better)
         for name in metrics
@@ -139,7 +133,7 @@ def summarise(table: pd.DataFrame, metrics: Mapping[str, Metric]) -> list[Row]:
     return [
         Row(
             *pair,
-            sizes[pair],
+            int(sizes[pair]),
             {
                 name: {key: _cell(interval, bests[name, key]) for key, interval in values.items()}
                 for name, values in cells.items()
@@ -163,21 +157,26 @@ def _cell(interval: Interval, best: Interval | None) -> Cell:
     return Cell(interval, interval.estimate == best.estimate, not interval.distinct_from(best))
 
 
-def _number(value: float) -> str:
-    """A number with three significant digits; a dash if it is not finite."""
+def number(value: float) -> str:
+    """A number with three significant digits; a dash if it is not finite.
+
+    Args:
+        value: the number.
+    """
     return "–" if not np.isfinite(value) else f"{value:.3g}"
 
 
-def gallery(table: pd.DataFrame, folder: ResultsFolder | None = None) -> list[dict[str, Any]]:
+def gallery(table: pd.DataFrame, folder: ResultsFolder | None = None, most: int = GALLERY) -> list[dict[str, Any]]:
     """The worst failed episodes, spread over scenarios, degradations, drivers and authorities, with replay commands.
 
     Args:
         table: one row per episode.
         folder: folder of the results for the replay commands; None without one.
+        most: largest number of episodes.
     """
     names = ["scenario", "degradation", "driver", "authority", "seed"]
     failed = table[table["terminated"].astype(bool)] if len(table) else table
-    chosen = _spread(_worst_first(failed), names[:-1], GALLERY) if len(failed) else failed
+    chosen = _spread(_worst_first(failed), names[:-1], most) if len(failed) else failed
     return [
         {
             **{name: row[name] for name in names},
@@ -242,13 +241,13 @@ def draw_plots(
     with mpl.rc_context(STYLE):
         if shown:
             what = "One panel a metric: authorities down, drivers by colour and mark."
-            picture = _svg(draw_intervals(rows, shown), "intervals")
+            picture = svg_of(draw_intervals(rows, shown), "intervals")
             plots.append(("Interquartile means with their 95 % intervals", what, picture))
             what = "Share of the episodes, of all drivers, whose value is at most that on the axis."
-            picture = _svg(draw_distributions(table, shown), "distributions")
+            picture = svg_of(draw_distributions(table, shown), "distributions")
             plots.append(("Distributions by authority", what, picture))
         what = "Share of the episodes, of all drivers and scenarios, that end in a collision or off the road."
-        plots.append(("Failures by degradation and authority", what, _svg(draw_failures(table), "failures")))
+        plots.append(("Failures by degradation and authority", what, svg_of(draw_failures(table), "failures")))
     return plots
 
 
@@ -340,8 +339,13 @@ def _panels(n: int, height: float) -> tuple[Figure, list[Axes]]:
     return figure, axes
 
 
-def _svg(figure: Figure, name: str) -> Markup:
-    """A figure as an SVG element with unique ids, in the colours of the page."""
+def svg_of(figure: Figure, name: str) -> Markup:
+    """A figure as an SVG element with unique ids, in the colours of the page.
+
+    Args:
+        figure: the figure.
+        name: beginning of the ids, unique in the page.
+    """
     buffer = io.StringIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph")  # text is not drawn as paths, so the reader's fonts decide

@@ -92,9 +92,7 @@ def evaluate(
     """
     drivers, authorities, chosen = chosen_drivers(driver), chosen_authorities(authority), chosen_suite(suite)
     numbers = _checked_seeds(seeds)
-    if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
-        raise ValueError(f"jobs = {jobs!r} must be an integer of at least 1")
-    choose_one("engine", engine, dict.fromkeys(ENGINES))
+    checked_jobs_and_engine(jobs, engine)
     if not isinstance(fresh, bool):
         raise ValueError(f"fresh = {fresh!r} must be True or False")
     if config is not None and not isinstance(config, Mapping):
@@ -102,33 +100,59 @@ def evaluate(
     changes = as_plain(config or {})
     checked_automation(automation)
     batches = list(plan(chosen, drivers, authorities, numbers, changes, automation))
-    _check_settings(batches)
+    check_settings(batches)
     if out is None:
-        done = [row for _, rows in _progressing(_run(batches, jobs, engine), batches, 0, progress) for row in rows]
+        done = [
+            row for _, rows in _progressing(run_batches(batches, None, jobs, engine), batches, progress) for row in rows
+        ]
         return sorted_table(pd.DataFrame(done))
     manifest = {
         "suite": suite if isinstance(suite, str) else chosen._asdict(),
         "seeds": numbers,
         "config": changes,
-        "versions": versions(),
-        "drivers": {name: _described("driver", name, entry, DRIVERS) for name, entry in drivers.items()},
-        "authorities": {name: _described("authority", name, entry, AUTHORITIES) for name, entry in authorities.items()},
+        **described_entries(drivers, authorities),
     }
     if automation is not None:
         manifest["automation"] = _origin_and_fingerprint("automation", "given", automation)
-    if added := additions():
-        manifest["additions"] = described(added)
     folder = ResultsFolder(Path(out).expanduser(), manifest, fresh)
     try:
         for notice in folder.notices:
             warnings.warn(notice, stacklevel=2)
-        missing = [batch for batch in batches if not folder.has(batch.driver[0], batch.authority[0], batch.key)]
-        found = sum(len(batch.episodes) for batch in batches) - sum(len(batch.episodes) for batch in missing)
-        for batch, rows in _progressing(_run(missing, jobs, engine), batches, found, progress):
-            folder.add(batch.driver[0], batch.authority[0], batch.key, rows)
+        for _ in _progressing(run_batches(batches, folder, jobs, engine), batches, progress):
+            pass
         return _finish(folder)
     finally:
         folder.close()
+
+
+def checked_jobs_and_engine(jobs: int, engine: str) -> None:
+    """Check how episodes are to be run.
+
+    Args:
+        jobs: number of processes.
+        engine: one of :data:`ENGINES`.
+
+    Raises:
+        ValueError: for a wrong number of processes, or an unknown engine.
+    """
+    if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
+        raise ValueError(f"jobs = {jobs!r} must be an integer of at least 1")
+    choose_one("engine", engine, dict.fromkeys(ENGINES))
+
+
+def described_entries(drivers: Mapping[str, DriverEntry], authorities: Mapping[str, AuthorityEntry]) -> dict[str, Any]:
+    """Parts of a folder's manifest: versions, drivers, authorities, and what the program has added to the tables.
+
+    Args:
+        drivers, authorities: entries by name.
+    """
+    manifest: dict[str, Any] = {
+        "versions": versions(),
+        "drivers": {name: _described("driver", name, entry, DRIVERS) for name, entry in drivers.items()},
+        "authorities": {name: _described("authority", name, entry, AUTHORITIES) for name, entry in authorities.items()},
+    }
+    added = additions()
+    return {**manifest, "additions": described(added)} if added else manifest
 
 
 def _checked_seeds(seeds: Iterable[int]) -> list[int]:
@@ -148,8 +172,15 @@ def _checked_seeds(seeds: Iterable[int]) -> list[int]:
     return list(numbers)
 
 
-def _check_settings(batches: Sequence[EpisodeBatch]) -> None:
-    """Check the settings of all batches before the first episode runs."""
+def check_settings(batches: Sequence[EpisodeBatch]) -> None:
+    """Check the settings of all batches before the first episode runs.
+
+    Args:
+        batches: the batches.
+
+    Raises:
+        ValueError: for wrong settings, or a person in the settings who would not act.
+    """
     checked: dict[tuple[str, bool, str], Settings] = {}
     for batch in batches:
         scenario, in_kernel = SCENARIOS[batch.scenario], batch.automation is None
@@ -185,9 +216,10 @@ def _described(
     )
     if known.get(name) == entry:
         return {"origin": "catalogue", "fingerprint": None, **own}
-    if entry.make is None:
+    make: Any = entry.make
+    if make is None:
         return {"origin": "settings", "fingerprint": entry.fingerprint, **own}
-    return {**_origin_and_fingerprint(what, name, entry.make, entry.fingerprint), **own}
+    return {**_origin_and_fingerprint(what, name, make, entry.fingerprint), **own}
 
 
 def _origin_and_fingerprint(
@@ -203,6 +235,35 @@ def _origin_and_fingerprint(
     return {"origin": f"{module}:{path}" if found else None, "fingerprint": told}
 
 
+def run_batches(
+    batches: Sequence[EpisodeBatch], folder: ResultsFolder | None, jobs: int, engine: str
+) -> Iterator[tuple[EpisodeBatch, engines.Rows]]:
+    """Run the batches that a folder does not hold yet, and store them there; those that it holds come first.
+
+    Args:
+        batches: batches to run.
+        folder: folder of the results; None for none.
+        jobs: number of processes.
+        engine: one of :data:`ENGINES`.
+
+    Returns:
+        Each batch with its rows, as an iterator.
+    """
+    missing = []
+    for batch in batches:
+        found = None if folder is None else folder.rows(batch.driver[0], batch.authority[0], batch.key)
+        if found is None:
+            missing.append(batch)
+        else:
+            yield batch, found
+    if not missing:
+        return
+    for batch, rows in _run(missing, jobs, engine):
+        if folder is not None:
+            folder.add(batch.driver[0], batch.authority[0], batch.key, rows)
+        yield batch, rows
+
+
 def _run(batches: Sequence[EpisodeBatch], jobs: int, engine: str) -> Iterator[tuple[EpisodeBatch, engines.Rows]]:
     if engine == "ray":
         return engines.ray_cluster(batches, jobs)
@@ -212,12 +273,11 @@ def _run(batches: Sequence[EpisodeBatch], jobs: int, engine: str) -> Iterator[tu
 def _progressing(
     results: Iterator[tuple[EpisodeBatch, engines.Rows]],
     batches: Sequence[EpisodeBatch],
-    done: int,
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[tuple[EpisodeBatch, engines.Rows]]:
     """Pass the results on as they come, and report each to ``progress``."""
     report = progress or (lambda done, total: None)
-    total = sum(len(batch.episodes) for batch in batches)
+    done, total = 0, sum(len(batch.episodes) for batch in batches)
     report(done, total)
     for batch, rows in results:
         yield batch, rows

@@ -11,10 +11,11 @@ stratum with one value adds no width at all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy import stats
 
 RESAMPLES = 1000
@@ -171,3 +172,53 @@ def _interval(values: np.ndarray, counts: np.ndarray | None, statistic: Statisti
     tails = [50.0 - 0.5 * COVERAGE, 50.0 + 0.5 * COVERAGE]
     low, high = np.percentile(statistic.of_samples(values, counts), tails)
     return Interval(estimate, float(low), float(high), len(values))
+
+
+def intervals_of_pairs(
+    table: pd.DataFrame, names: Iterable[str]
+) -> dict[tuple[str, str], dict[str, dict[str, Interval]]]:
+    """Every statistic of the columns of a results table, for each pair of authority and driver.
+
+    Args:
+        table: one row per episode, as returned by :func:`runner.evaluate`.
+        names: columns.
+
+    Returns:
+        Intervals by authority and driver, then by column, then by statistic.
+    """
+    rng, names = np.random.default_rng(0), list(names)
+    found = {}
+    for (authority, driver), part in table.groupby(["authority", "driver"], sort=False):
+        strata = part.groupby(["scenario", "degradation"]).ngroup().to_numpy()
+        columns = {name: part[name].to_numpy(dtype=float) for name in names}
+        found[str(authority), str(driver)] = intervals(columns, strata, rng)
+    return found
+
+
+def summarise(table: pd.DataFrame) -> pd.DataFrame:
+    """Means and interquartile means of all metrics with their 95 % intervals, as in the report.
+
+    Args:
+        table: one row per episode, as returned by :func:`runner.evaluate`.
+
+    Returns:
+        One row per authority, driver and metric: the number of episodes ``n`` in which the metric is defined, and
+        ``mean`` and ``IQM``, each with the ends of its interval, ``mean_low`` and so on.
+
+    Raises:
+        ValueError: if the table has no metric.
+    """
+    from shared_control_env.evaluation.metrics import METRICS
+
+    names = [name for name in METRICS if name in table.columns]
+    if not names:
+        raise ValueError("the table has no column of a metric; pass the table that evaluate() returned")
+    rows = []
+    for (authority, driver), columns in intervals_of_pairs(table, names).items():
+        for name, found in columns.items():
+            row: dict[str, str | float] = {"authority": authority, "driver": driver, "metric": name}
+            row["n"] = next(iter(found.values())).n
+            for statistic, value in found.items():
+                row |= {statistic: value.estimate, f"{statistic}_low": value.low, f"{statistic}_high": value.high}
+            rows.append(row)
+    return pd.DataFrame(rows)

@@ -16,8 +16,8 @@ from filelock import FileLock, Timeout
 MANIFEST = "benchmark.json"
 """File that describes the benchmark of the results in a folder."""
 
-TABLE, REPORT = "episodes.parquet", "report.html"
-"""Files with the table of all episodes, and with the report on them."""
+TABLE, REPORT, MARGINS = "episodes.parquet", "report.html", ("margins.csv", "margins.json")
+"""Files with the table of all episodes, with the report on them, and with the margins of a controllability study."""
 
 BATCHES = "episodes"
 """Folder with the files of the batches."""
@@ -161,7 +161,7 @@ class ResultsFolder:
 
     def _remove_results(self) -> None:
         """Remove the files that a benchmark wrote, and no others."""
-        for name in (MANIFEST, TABLE, REPORT):
+        for name in (MANIFEST, TABLE, REPORT, *MARGINS):
             (self.path / name).unlink(missing_ok=True)
         for path in (self.path / BATCHES).glob("*.parquet"):
             if _BATCH.fullmatch(path.name):
@@ -196,14 +196,15 @@ class ResultsFolder:
         )
         return "-".join([self._benchmark, *whose, digest(batch)])
 
-    def has(self, driver: str, authority: str, batch: str) -> bool:
-        """Whether the rows of a batch are stored.
+    def rows(self, driver: str, authority: str, batch: str) -> list[dict[str, Any]] | None:
+        """Rows of a batch, one per episode; None if they are not stored.
 
         Args:
             driver, authority: names of driver and authority.
             batch: text that identifies the episodes of the batch.
         """
-        return self._key(driver, authority, batch) in self._files
+        path = self._files.get(self._key(driver, authority, batch))
+        return None if path is None else pd.read_parquet(path).to_dict("records")  # type: ignore[return-value]
 
     def add(self, driver: str, authority: str, batch: str, rows: Sequence[Mapping[str, Any]]) -> None:
         """Store the rows of a batch.
@@ -248,7 +249,7 @@ def _entries(path: Path) -> list[str]:
 def _is_own_draft(name: str) -> bool:
     """Whether a file is an incomplete draft that :func:`write_atomically` left in a results folder."""
     written = name.removeprefix(_DRAFT)
-    return written != name and (written in (MANIFEST, TABLE, REPORT) or _BATCH.fullmatch(written) is not None)
+    return written != name and (written in (MANIFEST, TABLE, REPORT, *MARGINS) or _BATCH.fullmatch(written) is not None)
 
 
 def read_manifest(path: Path) -> dict[str, Any]:

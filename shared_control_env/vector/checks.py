@@ -26,7 +26,7 @@ class Actions(NamedTuple):
 
     Attributes:
         commands: the driver's commands as shares of their limits, shape (N, 2) [-].
-        alphas: authorities alpha_a, shape (N, 1) [-].
+        alphas: authorities over acceleration and steering, shape (N, 2) [-].
     """
 
     commands: np.ndarray
@@ -49,7 +49,7 @@ class OpenSlots:
 
     def __init__(self, num_envs: int, slots: tuple[str, ...]) -> None:
         self.num_envs, self.slots = num_envs, slots
-        self.no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 1)))
+        self.no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 2)))
         self.clipping = Clipping(num_envs)
 
     def checked(self, actions: Any) -> Actions:
@@ -72,7 +72,8 @@ class OpenSlots:
         for slot in self.slots:
             low, high, size = BOUNDS[slot]
             array = _numbers(given[slot])
-            if array is None or array.shape != (n, size):
+            per_channel = slot == AUTHORITY and array is not None and array.shape == (n, 2)
+            if array is None or not (array.shape == (n, size) or per_channel):
                 what = f"shape {array.shape}" if array is not None else f"the value {given[slot]!r}"
                 raise ValueError(f"actions[{slot!r}] has {what}; it must be numbers of shape ({n}, {size})")
             finite = np.isfinite(array)
@@ -83,7 +84,7 @@ class OpenSlots:
                     f"it must be finite, in [{low:g}, {high:g}]"
                 )
             self.clipping.note(slot, array, bool(array.max() > high + SLACK or array.min() < low - SLACK))
-            values[slot] = array
+            values[slot] = np.repeat(array, 2, axis=1) if array.shape[1] == 1 else array
         return Actions(values[DRIVER], values[AUTHORITY])
 
 

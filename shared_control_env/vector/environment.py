@@ -12,10 +12,11 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from shared_control_env.controllers.allocators import Allocator
+from shared_control_env.controllers.allocators import Allocator, in_kernel
 from shared_control_env.controllers.arrays import read_only
+from shared_control_env.controllers.assessor import Assessor
 from shared_control_env.core import kernel
-from shared_control_env.core.authority.allocators import ALLOCATE, FUZZY, fuzzy_authority
+from shared_control_env.core.authority.allocators import ALLOCATE, fuzzy_authority
 from shared_control_env.core.batch import (
     NOT_LOADED,
     WORK,
@@ -25,6 +26,7 @@ from shared_control_env.core.batch import (
     empty_starts,
     new_outputs,
 )
+from shared_control_env.core.compile.calls import PACKAGE
 from shared_control_env.core.compile.cold_start import cores
 from shared_control_env.core.compile.jit import is_interpreted
 from shared_control_env.core.control.predictive_driver import PROGRAM
@@ -116,7 +118,7 @@ class SharedControlVectorEnv(VectorEnv):
                 "environment, or its commands as actions"
             )
         self._allocate = _compiled(limiter)
-        self._user_allocates = self._allocate not in (None, fuzzy_authority, *FUZZY.values())
+        self._user_allocates = self._allocate is not None and self._allocate.__module__.partition(".")[0] != PACKAGE
         if is_interpreted():
             raise ValueError(
                 "NUMBA_DISABLE_JIT is set, and the vectorised environment is compiled alone: unset it, or use gym.make "
@@ -206,10 +208,27 @@ class SharedControlVectorEnv(VectorEnv):
         """Signals of the present step of each environment, records of :data:`records.SIGNALS`, (N,); read only."""
         return read_only(self._batch.signals)
 
-    def views(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Scenes and signals as lists of read-only 0-d records, which always show the present step."""
-        each = [slice(i, i + 1) for i in range(self.num_envs)]
-        return [self.scenes[i].reshape(()) for i in each], [self.signals[i].reshape(()) for i in each]
+    def views(self) -> list[np.ndarray]:
+        """Scenes as read-only 0-d records, which always show the present step."""
+        return [self.scenes[i : i + 1].reshape(()) for i in range(self.num_envs)]
+
+    def signals_for_allocators(self) -> np.ndarray:
+        """Copy of the signals with each driver's present u_h,act, records of :data:`records.SIGNALS`, shape (N,)."""
+        signals = self._batch.signals.copy()
+        signals["u_h_act"] = self._batch.memories["u_h_act"]
+        return signals
+
+    def assessors(self) -> list[Assessor]:
+        """Answers to allocators' questions about the present step of each environment; valid until the next reset."""
+        return [Assessor(i, self._batch, self._calls) for i in range(self.num_envs)]
+
+    def show_alerts(self, alerts: np.ndarray) -> None:
+        """Show each driver the alert of an allocator outside the kernel, from the next step on.
+
+        Args:
+            alerts: indices in :data:`core.authority.alerts.ALERTS`, shape (N,).
+        """
+        self._batch.signals["alert"] = alerts
 
     @property
     def episodes(self) -> tuple[Settings, ...]:
@@ -475,7 +494,7 @@ class SharedControlVectorEnv(VectorEnv):
             self._observations = out.observations.copy()
             self._pictures.note(out.infos, active, self._batch)
         if self._user_allocates:
-            wrong = np.flatnonzero(active & np.isnan(out.infos["alpha_a"]))
+            wrong = np.flatnonzero(active & np.isnan(out.infos["alpha"]).any(axis=1))
             if len(wrong):
                 raise ValueError(f"the allocator gave environment {wrong[0]} alpha_a = nan; it must be in [0, 1]")
         return result
@@ -523,8 +542,8 @@ def _compiled(limiter: Any) -> Any:
     """The compiled function that allocates alpha_a in the kernel; None if alpha_a is an open slot of the action."""
     if isinstance(limiter, bool | np.bool_):
         return fuzzy_authority if limiter else None
-    compiled = getattr(limiter, "compiled", None)
-    if not callable(compiled):
+    compiled = in_kernel(limiter)
+    if compiled is None:
         raise ValueError(
             f"limiter = {limiter!r} must be True, False, or an allocator with a function ``compiled``, which the "
             "kernel can run; use an allocator in Python with AuthorityLimiter on the single environment, or pass its "

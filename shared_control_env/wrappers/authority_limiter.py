@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, checked_authority
+from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, decide, hide
 from shared_control_env.controllers.driver import check_reset
 from shared_control_env.envs.slots import AUTHORITY
 from shared_control_env.wrappers.slot_wrapper import SlotWrapper
@@ -40,8 +40,9 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
             )
         if allocator is not None:
             check_reset(allocator, f"allocator = {allocator!r}")
-        self._given = allocator
-        self.allocator: Allocator = self._default() if allocator is None else allocator
+        follows_settings = isinstance(allocator, FuzzyAuthority) and allocator.operators is None
+        self._given = None if follows_settings else allocator
+        self.allocator: Allocator = self._default() if self._given is None else self._given
 
     def _default(self) -> FuzzyAuthority:
         return FuzzyAuthority(self.shared.episode.authority.operators)
@@ -64,8 +65,11 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
         return result
 
     def decide(self) -> np.ndarray:
-        """alpha_a of the planned step, shape (1,)."""
+        """Authorities over both channels of the planned step, shape (2,)."""
         scene, signals = self.shared.scene, self.shared.signals
         if self._given is not None:
-            scene, signals = scene.copy(), signals.copy()  # so that a user's allocator cannot change them
-        return np.array([checked_authority(self.allocator.allocate(scene, signals))])
+            scene, signals = scene.copy(), self.shared.signals_for_allocator()  # copies, which a user may change
+            hide(signals, self.allocator)
+        alphas, alert = decide(self.allocator, scene, signals, self.shared.assessor, "allocator")
+        self.shared.signals["alert"] = alert
+        return alphas

@@ -7,8 +7,9 @@ import zipfile
 import numpy as np
 import pytest
 
-from agents.drivers import POLICIES, authority_entry, driver_entry
+from agents.drivers import authority_entry, driver_entry
 from shared_control_env.evaluation.fingerprint import fingerprint
+from shared_control_env.learned.shipped import POLICIES
 
 STORED = dict(np.load(POLICIES / "driver-0.npz"))
 CARD = json.loads(str(STORED["card"]))

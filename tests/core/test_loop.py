@@ -18,7 +18,9 @@ PHI = np.exp(-0.05 / 0.2)
 
 @jit
 def act(u_h_des, alpha_a, batch):
-    loop.act(u_h_des, alpha_a, environment(0, batch))
+    e = environment(0, batch)
+    e.signals.alpha[0] = e.signals.alpha[1] = alpha_a
+    loop.act(u_h_des, e)
 
 
 @jit

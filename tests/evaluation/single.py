@@ -12,16 +12,14 @@ def drive_single(batch):
     """Metrics of a batch's one episode; the predictive driver is solved by OSQP here, to its tolerance of 1e-5."""
     ((degradation, seed),) = batch.episodes
     make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
-    env = AuthorityLimiter(
-        environment_class(batch.scenario)(settings_of(batch, degradation)), make_allocator() if make_allocator else None
-    )
+    env = AuthorityLimiter(environment_class(batch.scenario)(settings_of(batch, degradation)), make_allocator())
     env = DriverModel(env, make_driver() if make_driver else None)
     env.reset(seed=seed)
     settings = env.unwrapped.episode
     recorder, going, k = Recorder(settings.steps, 1), True, 0
     while going:
         _, _, terminated, truncated, info = env.step(0)
-        going = recorder.note(k, as_batch(info), np.array([terminated or truncated]))
+        going = recorder.note(k, as_batch(info), np.array([terminated or truncated]), env.unwrapped.scene[None])
         k += 1
     return measure_all(recorder.trajectory(0, settings, 1.0))
 

@@ -18,7 +18,7 @@ def halved(c):
 
 @metric("-", "neither")
 def steps_taken(t):
-    '''Time steps of the episode.'''
+    '''States of the episode.'''
     return float(len(t.speed))
 
 
@@ -53,7 +53,7 @@ def program(tmp_path):
 def test_processes_know_what_was_added(program):
     one, two = run(program, 1, "one"), run(program, 2, "two")
     assert one.returncode == two.returncode == 0, one.stderr + two.stderr
-    assert one.stdout.startswith("8 40.0")
+    assert one.stdout.startswith("8 41.0")
     assert (program / "one/episodes.parquet").is_file()
     columns = lambda text: [line.rsplit(",", 6)[0] for line in text.splitlines()]
     assert columns(one.stdout) == columns(two.stdout)

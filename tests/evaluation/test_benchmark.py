@@ -66,7 +66,7 @@ def test_the_single_environment_gives_the_same_metrics(scenario, authority):
     row = evaluate("distracted", authority, suite, seeds=[11]).iloc[0]
     entries = ("distracted", DRIVERS["distracted"]), (authority, AUTHORITIES[authority])
     single = drive_single(EpisodeBatch(scenario, *entries, (("oscillation", 11),), {}))
-    for name in set(METRICS) - set(TIMED):
+    for name in set(METRICS) - set(TIMED) - {"time_to_detect", "missed_detection"}:  # which need the twin
         assert single[name] == pytest.approx(row[name], abs=1e-9, nan_ok=True), name
 
 
@@ -135,7 +135,7 @@ def test_resumes_without_losing_or_doubling(tmp_path, monkeypatch):
     monkeypatch.setattr(runner_module, "_run", real)
     told = []
     table = evaluate(["scripted", "none"], "fixed", SMALL, out=tmp_path / "run", progress=lambda *n: told.append(n))
-    assert told[0] == (6, 12)
+    assert told[:2] == [(0, 12), (3, 12)]
     assert told[-1] == (12, 12)
     pd.testing.assert_frame_equal(rows_of(table), rows_of(evaluate(["scripted", "none"], "fixed", SMALL)))
     pd.testing.assert_frame_equal(table, pd.read_parquet(tmp_path / "run/episodes.parquet"))

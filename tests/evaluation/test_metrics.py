@@ -8,6 +8,7 @@ from shared_control_env.evaluation import metrics as m
 from shared_control_env.evaluation.metrics import METRICS, Trajectory
 
 T = 100
+STATES = ("lateral_error", "speed", "target_speed", "lateral_speed", "yaw_rate", "gap", "lead_speed")
 
 
 def trajectory(**changes):
@@ -16,6 +17,7 @@ def trajectory(**changes):
         "dt": 0.05,
         "lateral_error": np.zeros(T),
         "lane_width": 4.0,
+        "body_width": 2.0,
         "speed": np.full(T, 10.0),
         "target_speed": np.full(T, 10.0),
         "lateral_speed": np.zeros(T),
@@ -28,13 +30,19 @@ def trajectory(**changes):
         "driver": np.zeros((T, 2)),
         "automation": np.zeros((T, 2)),
         "authority": np.ones(T),
+        "sound_authority": np.ones(T),
+        "alert": np.zeros(T, dtype=bool),
         "degraded": np.zeros(T, dtype=bool),
         "crashed": False,
         "left_road": False,
         "solver_failures": 0,
         "wall_time": 0.5,
     }
-    return Trajectory(**{**values, **changes})
+    values |= changes
+    for name in STATES:  # the state in which the episode ends is the last one again, unless a test gives its own
+        if len(values[name]) == len(values["command"]):
+            values[name] = np.append(values[name], values[name][-1])
+    return Trajectory(**values)
 
 
 def steps(*pieces):
@@ -48,10 +56,18 @@ FAULT = steps((20, 0), (80, 1)).astype(bool)  # sets in after 1 s
 
 def test_a_quiet_drive():
     quiet = m.measure_all(trajectory())
-    undefined = {"min_gap", "min_thw", "min_ttc", "time_to_detect", "missed_detection", "recovery_time"}
+    undefined = {
+        "min_gap",
+        "min_thw",
+        "min_ttc",
+        "time_to_detect",
+        "time_to_alert",
+        "missed_detection",
+        "recovery_time",
+    }
     assert {name for name, value in quiet.items() if np.isnan(value)} == undefined
     assert quiet.pop("real_time_factor") == pytest.approx(10.0)
-    assert quiet.pop("authority_min") == 1.0
+    assert (quiet.pop("authority_min"), quiet.pop("controlled"), quiet.pop("lane_room_min")) == (1.0, 1.0, 1.0)
     assert all(value == 0.0 for name, value in quiet.items() if name not in undefined)
 
 
@@ -71,12 +87,24 @@ LATERAL = steps((10, 0.0), (20, 2.5), (10, 1.0), (5, -3.0), (55, 0.0))
         ("collisions", {"crashed": True}, 1.0),
         ("road_departures", {"left_road": True}, 1.0),
         ("lane_departures", {"lateral_error": LATERAL}, 2.0),
-        ("lane_departures", {"lateral_error": steps((5, 2.1), (95, 0.0))}, 1.0),
-        ("lane_departures", {"lateral_error": steps((100, 2.0))}, 0.0),
+        ("lane_departures", {"lateral_error": steps((5, 1.1), (95, 0.0))}, 1.0),
+        ("lane_departures", {"lateral_error": steps((100, 1.0))}, 0.0),
+        ("lane_departures", {"lateral_error": np.append(np.zeros(T), 1.2)}, 1.0),  # in the last state
+        ("controlled", {"degraded": FAULT, "lateral_error": steps((15, 1.5), (85, 0.9))}, 1.0),  # before the onset
+        ("controlled", {"degraded": FAULT, "lateral_error": np.append(np.zeros(T), -1.2)}, 0.0),
+        ("controlled", {"lateral_error": steps((15, 1.5), (85, 0.9))}, 0.0),
+        ("controlled", {"left_road": True}, 0.0),
+        ("controlled", {"crashed": True}, 0.0),
+        ("lane_room_min", {"lateral_error": np.append(np.zeros(T), -2.3)}, -1.3),
         ("time_out_of_lane", {"lateral_error": LATERAL}, 25 * 0.05),
         ("lateral_max", {"lateral_error": LATERAL}, 3.0),
-        ("lateral_rms", {"lateral_error": steps((50, 1.0), (50, -3.0))}, np.sqrt(5.0)),
+        ("lateral_rms", {"lateral_error": np.repeat([1.0, -3.0], [51, 50])}, np.sqrt(501.0 / 101.0)),
         ("min_gap", {"gap": steps((50, np.inf), (30, 12.0), (20, 8.0))}, 8.0),
+        ("min_gap", {"gap": np.append(np.full(T, 12.0), 0.0), "crashed": True}, 0.0),  # whatever was hit
+        ("min_ttc", {"gap": np.append(np.full(T, np.inf), 0.0), "crashed": True}, 0.0),
+        ("exposed_time", {"gap": steps((50, 20.0), (50, 8.0)), "lead_speed": np.full(T, 6.0)}, 51 * 0.05),
+        ("exposed_time_integral", {"gap": steps((50, 20.0), (50, 8.0)), "lead_speed": np.full(T, 6.0)}, 51 * 0.05),
+        ("max_drac", {"gap": np.append(np.full(T, 8.0), 0.0), "lead_speed": np.full(T, 6.0), "crashed": True}, 1.0),
         ("min_thw", {"gap": steps((50, 20.0), (50, 8.0))}, 0.8),
         ("min_thw", {"gap": steps((100, 8.0)), "speed": np.full(T, 0.5)}, np.nan),
         ("min_ttc", {"gap": steps((50, 20.0), (50, 8.0)), "lead_speed": np.full(T, 6.0)}, 2.0),
@@ -85,6 +113,16 @@ LATERAL = steps((10, 0.0), (20, 2.5), (10, 1.0), (5, -3.0), (55, 0.0))
         ("max_drac", {"gap": np.full(T, 8.0), "lead_speed": np.full(T, 12.0)}, 0.0),
         ("time_to_detect", {"degraded": FAULT, "authority": steps((26, 1.0), (74, 0.5))}, 6 * 0.05),
         ("time_to_detect", {"degraded": FAULT, "authority": steps((10, 0.5), (90, 1.0))}, np.nan),
+        (
+            "time_to_detect",
+            {"degraded": FAULT, "authority": steps((100, 0.5)), "sound_authority": steps((100, 0.5))},
+            np.nan,
+        ),
+        ("time_to_detect", {"degraded": FAULT, "sound_authority": np.full(T, np.nan)}, np.nan),
+        ("false_alert", {"degraded": FAULT, "alert": steps((5, 1), (95, 0)).astype(bool)}, 0.25),
+        ("false_alert", {"alert": steps((50, 1), (50, 0)).astype(bool)}, 0.5),
+        ("time_to_alert", {"degraded": FAULT, "alert": steps((26, 0), (74, 1)).astype(bool)}, 6 * 0.05),
+        ("time_to_alert", {"degraded": FAULT}, np.nan),
         ("missed_detection", {"degraded": FAULT, "authority": steps((26, 1.0), (74, 0.5))}, 0.0),
         ("missed_detection", {"degraded": FAULT, "authority": steps((100, 0.9))}, 1.0),
         ("false_authority_loss", {"degraded": FAULT, "authority": steps((10, 0.5), (10, 1.0), (80, 0.0))}, 0.25),
@@ -103,8 +141,8 @@ LATERAL = steps((10, 0.0), (20, 2.5), (10, 1.0), (5, -3.0), (55, 0.0))
         ("conflict", {"driver": np.full((T, 2), 0.5), "automation": np.full((T, 2), [-0.2, 0.2])}, 0.1),
         ("lateral_acceleration_max", {"yaw_rate": steps((50, 0.1), (50, -0.3))}, 3.0),
         ("lateral_jerk_max", {"yaw_rate": steps((50, 0.0), (50, 0.2))}, 4.0),
-        ("iso_11270_violation", {"yaw_rate": steps((90, 0.0), (10, 0.31))}, 9 / 99),
-        ("iso_11270_violation", {"yaw_rate": steps((80, 0.0), (20, 0.26))}, 9 / 99),
+        ("iso_11270_violation", {"yaw_rate": steps((90, 0.0), (10, 0.31))}, 10 / 100),
+        ("iso_11270_violation", {"yaw_rate": steps((80, 0.0), (20, 0.26))}, 9 / 100),
         ("jerk_rms", {"command": np.stack([steps((50, 0.0), (50, 0.1)), np.zeros(T)], 1)}, np.sqrt(100.0 / 99.0)),
         ("speed_rms", {"speed": steps((50, 12.0), (50, 8.0))}, 2.0),
         ("recovery_time", {"degraded": FAULT, "lateral_error": steps((30, 0.0), (10, 1.0), (60, 0.2))}, 20 * 0.05),
@@ -151,16 +189,14 @@ def test_left_and_right_are_the_same(name):
 
 
 def test_short_episodes_have_no_windowed_jerk():
-    short = trajectory(
-        **{key: getattr(trajectory(), key)[:5] for key in ("lateral_error", "speed", "lateral_speed", "yaw_rate")}
-    )
+    short = trajectory(**{key: getattr(trajectory(), key)[:6] for key in STATES})
     assert np.isnan(METRICS["lateral_jerk_max"].measure(short))
     assert METRICS["iso_11270_violation"].measure(short) == 0.0
 
 
 def test_the_lateral_acceleration_is_that_of_the_centre_of_mass():
     """In a slide the car yaws without a force: v_y' takes back what v_x r gives."""
-    t = 0.05 * np.arange(T)
+    t = 0.05 * np.arange(T + 1)
     spinning = {"yaw_rate": np.full(T, 1.0), "lateral_speed": -10.0 * t}  # v_x = 10 m/s: a straight path in space
     assert METRICS["lateral_acceleration_max"].measure(trajectory(**spinning)) == pytest.approx(0.0, abs=1e-9)
     assert METRICS["iso_11270_violation"].measure(trajectory(**spinning)) == 0.0

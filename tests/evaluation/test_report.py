@@ -2,7 +2,6 @@
 
 import re
 import shlex
-import shutil
 import xml.etree.ElementTree as ET
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from shared_control_env.evaluation.report import gallery, summarise, write_report
+from shared_control_env.evaluation.report import gallery, rows_of, write_report
 
 NAUGHTY = "<script>document.title='broken in'</script>"
 
@@ -64,31 +63,6 @@ def report(tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
     write_report(episodes(), METRICS, path, {"suite": "small", "seeds": [0, 1, 2, 3], "note": NAUGHTY})
     return path
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    if not shutil.which("chromium") or not shutil.which("chromedriver"):
-        pytest.skip("needs Chromium and ChromeDriver (Debian's packages chromium and chromium-driver)")
-    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium, of the extra 'dev'")
-    options = webdriver.ChromeOptions()
-    options.binary_location = shutil.which("chromium")
-    for argument in (
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-quic",
-        "--no-first-run",
-        "--disable-background-networking",
-        "--disable-component-update",
-        "--disable-sync",
-        f"--user-data-dir={tmp_path_factory.mktemp('profile')}",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    chrome = webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which("chromedriver")))
-    yield chrome
-    chrome.quit()
 
 
 @pytest.fixture
@@ -244,7 +218,7 @@ def test_it_fits_the_screen(page, width, scheme):
 
 
 def test_summary_has_the_numbers():
-    rows = {(row.authority, row.driver): row for row in summarise(episodes(), METRICS)}
+    rows = {(row.authority, row.driver): row for row in rows_of(episodes(), METRICS)}
     table = episodes()
     for (authority, driver), part in table.groupby(["authority", "driver"]):
         cell = rows[authority, driver].cells["lateral_rms"]["mean"]
@@ -257,12 +231,12 @@ def test_summary_has_the_numbers():
 
 
 def test_one_seed_marks_nothing_as_distinguishable():
-    rows = summarise(episodes().query("seed == 1"), METRICS)
+    rows = rows_of(episodes().query("seed == 1"), METRICS)
     assert all(row.cells["lateral_rms"]["mean"].tied for row in rows)
 
 
 def test_no_best_where_all_are_the_same_or_neither_direction_is_better():
-    rows = summarise(episodes().assign(lateral_rms=0.5), METRICS)
+    rows = rows_of(episodes().assign(lateral_rms=0.5), METRICS)
     assert not any(row.cells[name]["mean"].best for row in rows for name in ("lateral_rms", "authority_min", "never"))
     assert any(row.cells["min_ttc"]["mean"].best for row in rows)
 

@@ -11,10 +11,10 @@ pytest.importorskip("stable_baselines3", reason="needs the extra 'train'")
 from rich.console import Console
 
 from agents import train
-from agents.drivers import POLICIES, shipped
 from agents.tasks import TASKS
 from experiments import policies
 from shared_control_env.learned.policy import Policy
+from shared_control_env.learned.shipped import POLICIES, shipped
 
 
 def test_a_small_run_is_published(tmp_path, monkeypatch):

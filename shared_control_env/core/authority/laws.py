@@ -54,7 +54,7 @@ def apply_law(
     law: int,
     u_des: np.ndarray,
     u_f: np.ndarray,
-    alpha: float,
+    alpha: np.ndarray,
     parameters: LawParameters,
     strict: bool,
     u_act: np.ndarray,
@@ -67,19 +67,19 @@ def apply_law(
     Args:
         law: index in :data:`LAWS`.
         u_des, u_f: desired and degraded command ``[a, delta]`` [m/s^2, rad], shape (2,).
-        alpha: authority in [0, 1] [-].
+        alpha: authority over each channel in [0, 1], shape (2,) [-].
         parameters: tolerances of Eq. 10.
         strict: whether the second line of Eq. 10 applies only for alpha < 1, as printed.
         u_act: actual command [m/s^2, rad], written, shape (2,).
     """
     if law == PAPER:
-        u_act[0] = limit_channel(u_des[0], u_f[0], alpha, parameters.tolerance_a, strict)
-        u_act[1] = limit_channel(u_des[1], u_f[1], alpha, parameters.tolerance_delta, strict)
+        u_act[0] = limit_channel(u_des[0], u_f[0], alpha[0], parameters.tolerance_a, strict)
+        u_act[1] = limit_channel(u_des[1], u_f[1], alpha[1], parameters.tolerance_delta, strict)
         return
-    gain = 0.0
-    if law == PROPORTIONAL:
-        gain = alpha
-    elif law == NONE:
-        gain = 1.0
-    u_act[0] = gain * u_f[0]
-    u_act[1] = gain * u_f[1]
+    for i in range(2):
+        gain = 0.0
+        if law == PROPORTIONAL:
+            gain = alpha[i]
+        elif law == NONE:
+            gain = 1.0
+        u_act[i] = gain * u_f[i]

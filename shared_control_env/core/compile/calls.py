@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dis import get_instructions
 from types import FunctionType
-from typing import Any, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from llvmlite import ir
@@ -45,9 +45,12 @@ def compiled_type(kind: Any) -> Any:
     """Numba's type that corresponds to a Python type.
 
     Args:
-        kind: None, ``float``, ``int``, ``bool``, a tuple of types, a structured NumPy type, one of numba's types, or a
-            class of :mod:`core.records` or :mod:`core.parameters`, which stands for a record with its fields.
+        kind: None, ``float``, ``int``, ``bool``, a tuple of types, a structured NumPy type, one of numba's types, a
+            class of :mod:`core.records` or :mod:`core.parameters`, which stands for a record with its fields, or
+            ``Annotated[type, numba's type]``.
     """
+    if get_origin(kind) is Annotated:
+        kind = get_args(kind)[1]
     if kind is None:
         return types.void
     if isinstance(kind, tuple):
@@ -68,7 +71,7 @@ def by_value(kind: Any) -> Any:
     Args:
         kind: class of the named tuple.
     """
-    return types.NamedTuple([compiled_type(hint) for hint in get_type_hints(kind).values()], kind)
+    return types.NamedTuple([compiled_type(hint) for hint in get_type_hints(kind, include_extras=True).values()], kind)
 
 
 class Interface:

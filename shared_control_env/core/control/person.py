@@ -12,6 +12,7 @@ from math import cos, exp, sin
 
 import numpy as np
 
+from shared_control_env.core.authority.alerts import NO_ALERT, TACTILE, VISUAL
 from shared_control_env.core.compile.jit import jit, jit_inlined
 from shared_control_env.core.faults.noise import coloured, standard_normal
 from shared_control_env.core.parameters import Parameters
@@ -19,10 +20,10 @@ from shared_control_env.core.records import MAX_DELAY, PersonMemory, Scene
 from shared_control_env.core.world.scene import gap_ahead
 from shared_control_env.core.world.vehicle import PSI, V_X, Y, implicit_step
 
-REASONS = ("nothing", "lane position", "heading", "headway", "felt steering", "felt acceleration", "display")
+REASONS = ("nothing", "lane position", "heading", "headway", "felt steering", "felt acceleration", "display", "alert")
 """What a person may notice; the index of a reason is its code."""
 
-NOTHING, LANE_POSITION, HEADING, HEADWAY, FELT_STEERING, FELT_ACCELERATION, DISPLAY = range(7)
+NOTHING, LANE_POSITION, HEADING, HEADWAY, FELT_STEERING, FELT_ACCELERATION, DISPLAY, ALERT = range(8)
 
 LATERAL, DIRECTION, SPEED, ARM = range(4)
 """Indices of the errors in a person's memory."""
@@ -56,7 +57,7 @@ def clear_person(memory: PersonMemory, p: Parameters) -> None:
     memory.engaged = p.person.engaged
     memory.noticed = np.inf
     memory.response = 0.0 if p.person.engaged else response_time(p)
-    memory.reason = NOTHING
+    memory.reason, memory.alerted = NOTHING, 0.0
     for i in range(4):
         memory.error[i] = 0.0
 
@@ -116,13 +117,14 @@ def perceive_late(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Par
 
 
 @jit
-def what_is_noticed(seen: Scene, p: Parameters) -> int:
+def what_is_noticed(seen: Scene, alerted: float, p: Parameters) -> int:
     """First of the :data:`REASONS` to take over that a perceived scene gives.
 
     At k = 0 nothing is felt at the wheel.
 
     Args:
         seen: the scene as the person perceives it, record of :data:`records.SCENE`.
+        alerted: time for which an alert has lasted [s].
         p: parameters.
 
     Returns:
@@ -141,7 +143,10 @@ def what_is_noticed(seen: Scene, p: Parameters) -> int:
     wanted = min(max((seen.v_target - z[V_X]) / ADJUSTING, -p.limits.a_max), p.limits.a_max)
     if seen.k > 0 and abs(seen.felt[0] - wanted) > person.felt_acceleration:
         return FELT_ACCELERATION
-    return DISPLAY if seen.displayed < person.display else NOTHING
+    if seen.displayed < person.display:
+        return DISPLAY
+    called = seen.alert == TACTILE or (seen.alert == VISUAL and alerted >= person.glance)
+    return ALERT if called else NOTHING
 
 
 @jit_inlined
@@ -164,7 +169,8 @@ def perceive_and_attend(scene: Scene, u_last: np.ndarray, memory: PersonMemory, 
     perceive_late(scene, u_last, memory, p, seen)
     if not memory.engaged:
         if memory.noticed == np.inf:
-            memory.reason = what_is_noticed(seen, p)
+            memory.alerted = memory.alerted + p.task.dt if seen.alert != NO_ALERT else 0.0
+            memory.reason = what_is_noticed(seen, memory.alerted, p)
             if memory.reason != NOTHING:
                 memory.noticed = scene.t
         memory.engaged = scene.t >= memory.noticed + memory.response

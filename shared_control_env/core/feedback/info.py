@@ -61,7 +61,9 @@ class Info:
         u_h_act: the driver's actual command.
         u: command of the vehicle.
         r_x, r_y: longitudinal and lateral risk [-].
-        alpha_a: authority of the automation [-].
+        alpha: authority of the automation over each channel, acceleration and steering [-].
+        alpha_a: the smaller of the two [-].
+        alert: alert to the driver, index in :data:`core.authority.alerts.ALERTS`.
         prediction: predicted state xi(k + tau_p) = [x, y, psi, v, a, r] in the Cartesian frame.
         prediction_road: predicted position (s, d) in the road frame [m].
         safe_area_lower, safe_area_upper: boundaries of the safe area C, vertices (s, d) [m].
@@ -95,7 +97,9 @@ class Info:
     u: Vector2
     r_x: float
     r_y: float
+    alpha: Vector2
     alpha_a: float
+    alert: int
     prediction: Vector6
     prediction_road: Vector2
     safe_area_lower: Chain
@@ -135,12 +139,12 @@ def note_signals(scene: Scene, signals: Signals, faults: np.ndarray, failures: i
     for i in range(2):
         info.u_a_des[i], info.u_a_f[i], info.u_a_act[i] = signals.u_a_des[i], signals.u_a_f[i], signals.u_a_act[i]
         info.u_h_des[i], info.u_h_act[i], info.u[i] = signals.u_h_des[i], signals.u_h_act[i], signals.u[i]
-        info.fault[i] = signals.fault[i]
+        info.fault[i], info.alpha[i] = signals.fault[i], signals.alpha[i]
         info.prediction_road[i], info.misperception[i] = signals.prediction_road[i], signals.misperception[i]
     for i in range(3):
         for j in range(5):
             info.neighbours[i, j] = scene.neighbours[i, j]
-    info.r_x, info.r_y, info.alpha_a = signals.r_x, signals.r_y, signals.alpha_a
+    info.r_x, info.r_y, info.alpha_a, info.alert = signals.r_x, signals.r_y, signals.alpha_a, signals.alert
     for k in range(MAX_CHAIN):
         for i in range(2):
             info.safe_area_lower[k, i] = scene.area.lower[k, i]

@@ -31,8 +31,10 @@ from shared_control_env.core.world.vehicle import V_X, R, plant_step, transmitte
 
 
 @jit_inlined
-def predict_ego(scene: Scene, u_f: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals, work: Motion) -> None:
-    """Predict the ego state xi(k + tau_p) under the degraded command (Eq. 1).
+def predict_ego(
+    scene: Scene, u_f: np.ndarray, tau: float, line: np.ndarray, p: Parameters, signals: Signals, work: Motion
+) -> None:
+    """Predict the ego state xi(k + tau) under the degraded command (Eq. 1).
 
     The prediction starts from the present pose and speed. Its yaw rate is that of the dynamic model after one step
     under u_a,f, integrated as the plant is: one implicit step of the controllers has a yaw rate 14 to 24 % lower, so
@@ -45,6 +47,7 @@ def predict_ego(scene: Scene, u_f: np.ndarray, line: np.ndarray, p: Parameters, 
     Args:
         scene: record of :data:`records.SCENE`.
         u_f: degraded command ``[a, delta]`` [m/s^2, rad], shape (2,).
+        tau: prediction horizon [s].
         line: reference line, shape (m, 6).
         p: parameters.
         signals: record of :data:`records.SIGNALS`; ``prediction`` and ``prediction_road`` are written.
@@ -56,7 +59,7 @@ def predict_ego(scene: Scene, u_f: np.ndarray, line: np.ndarray, p: Parameters, 
         xi[i] = state[i]
     plant_step(xi, u_f[0], u_f[1], p.task.dt, p.model, work.plant)
     xi[0], xi[1], xi[2], xi[3], xi[4], xi[5] = ctra(
-        state[0], state[1], state[2], state[V_X], transmitted(u_f[0], p.model), xi[R], p.task.tau_p
+        state[0], state[1], state[2], state[V_X], transmitted(u_f[0], p.model), xi[R], tau
     )
     s, d, _, _ = locate(line, xi[0], xi[1])
     signals.prediction_road[0], signals.prediction_road[1] = s, d
@@ -85,10 +88,13 @@ def predict_neighbours(scene: Scene, traffic: np.ndarray, line: np.ndarray, tau:
             predicted[i, 1], predicted[i, 2] = s, v * cos(psi - psi_road)
 
 
-def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals, work: Motion) -> None:
+def assess(
+    tau: float, scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, signals: Signals, work: Motion
+) -> None:
     """Compute both risks that arise if the degraded command ``signals.u_a_f`` drives the car (Eq. 1-8).
 
     Args:
+        tau: prediction horizon [s]; the paper's is ``p.task.tau_p``.
         scene: record of :data:`records.SCENE` with the safe area.
         traffic: other vehicles, shape (n, 8).
         line: reference line, shape (m, 6).
@@ -97,8 +103,8 @@ def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, s
             ``r_x`` and ``r_y`` are written.
         work: scratch of the vehicle's motion.
     """
-    predict_ego(scene, signals.u_a_f, line, p, signals, work)
-    predict_neighbours(scene, traffic, line, p.task.tau_p, signals.predicted_neighbours)
+    predict_ego(scene, signals.u_a_f, tau, line, p, signals, work)
+    predict_neighbours(scene, traffic, line, tau, signals.predicted_neighbours)
     if p.authority.shared:  # the assessment has the automation's errors of perception
         signals.prediction_road[1] += signals.misperception[0]
         if signals.misperception[1] > 0.0:
@@ -110,5 +116,5 @@ def assess(scene: Scene, traffic: np.ndarray, line: np.ndarray, p: Parameters, s
     )
 
 
-ASSESS = Interface(None, Scene, MATRIX, MATRIX, Parameters, Signals, Motion)
-"""``assess(scene, traffic, line, p, signals, work)``, compiled apart from the loop."""
+ASSESS = Interface(None, float, Scene, MATRIX, MATRIX, Parameters, Signals, Motion)
+"""``assess(tau, scene, traffic, line, p, signals, work)``, compiled apart from the loop."""

@@ -36,14 +36,15 @@ class SlotAction(ActionType):
         """Class of the vehicle that executes the action."""
         return EgoVehicle
 
-    def decode(self, action: Any) -> tuple[np.ndarray, float]:
+    def decode(self, action: Any) -> tuple[np.ndarray, np.ndarray]:
         """Split an action into the driver's desired command and the automation's authority.
 
         Args:
             action: dict with the keys ``driver`` and ``authority``.
 
         Returns:
-            u_h,des, ``[a, delta]`` as shares of their limits in [-1, 1], shape (2,) [-]; and alpha_a [-].
+            u_h,des, ``[a, delta]`` as shares of their limits in [-1, 1], shape (2,) [-]; and the authorities over both
+            channels, shape (1,) or (2,) [-].
 
         Raises:
             ValueError: if a slot is missing, unknown, of the wrong shape or not finite.
@@ -54,4 +55,4 @@ class SlotAction(ActionType):
                 "AuthorityLimiter and DriverModel bind one each"
             )
         command = checked_slot(DRIVER, action[DRIVER], self.clipping)
-        return command, float(checked_slot(AUTHORITY, action[AUTHORITY], self.clipping)[0])
+        return command, checked_slot(AUTHORITY, action[AUTHORITY], self.clipping)

@@ -11,7 +11,9 @@ command = st.floats(-5.0, 5.0)
 
 def actual(law, u_des, u_f, alpha):
     u_act = np.empty(2)
-    apply_law(LAWS.index(law), np.array(u_des), np.array(u_f), alpha, LawParameters(), False, u_act)
+    apply_law(
+        LAWS.index(law), np.array(u_des), np.array(u_f), np.broadcast_to(alpha, 2).copy(), LawParameters(), False, u_act
+    )
     return u_act
 
 
@@ -44,6 +46,11 @@ def test_the_other_laws():
     np.testing.assert_array_equal(actual("none", [1.0, 0.0], [3.0, 0.3], 0.5), [3.0, 0.3])
     np.testing.assert_array_equal(actual("proportional", [1.0, 0.0], [3.0, 0.3], 0.5), [1.5, 0.15])
     np.testing.assert_array_equal(actual("driver_only", [1.0, 0.0], [3.0, 0.3], 0.5), [0.0, 0.0])
+
+
+def test_each_channel_has_its_own_authority():
+    np.testing.assert_array_equal(actual("proportional", [1.0, 0.0], [3.0, 0.3], [1.0, 0.5]), [3.0, 0.15])
+    np.testing.assert_allclose(actual("paper", [1.0, 0.1], [3.0, 0.4], [0.2, 0.5]), [0.2, 0.05])
 
 
 def test_eq_10_acts_on_each_channel_by_itself():

@@ -265,9 +265,6 @@ class PersonParameters(NamedTuple):
         felt_acceleration: smallest difference between the automation's acceleration and the person's own choice that
             is noticed [m/s^2]; assumed.
         display: displayed authority alpha_a below which the display is noticed [-]; assumed. With 0 there is none.
-        glance: time for which a visual alert must last to be noticed [s]; assumed. A tactile alert is noticed at once:
-            in 129 studies the take-over times were shorter after auditory or vibrotactile requests than after visual
-            ones or none (Zhang et al., 2019).
         response: median time from noticing to acting [s]; log-normal over persons, see :data:`PERSONS`.
         response_spread: standard deviation of the logarithm of that time [-].
         arm_noise: standard deviation of the error of a command, divided by the command: signal-dependent noise of the
@@ -286,7 +283,6 @@ class PersonParameters(NamedTuple):
     felt_steering: Annotated[float, Interval(ge=0.001, le=0.5)] = 0.08
     felt_acceleration: Annotated[float, Interval(ge=0.01, le=10.0)] = 3.0
     display: Fraction = 0.5
-    glance: Annotated[float, Interval(ge=0.0, le=30.0)] = 1.0
     response: Annotated[float, Interval(ge=0.0, le=30.0)] = 1.2
     response_spread: Annotated[float, Interval(ge=0.0, le=2.0)] = 0.5
     arm_noise: Annotated[float, Interval(ge=0.0, le=1.0)] = 0.05

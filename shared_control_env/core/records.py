@@ -110,10 +110,10 @@ class Scene:
         y_target: lateral position to track [m].
         v_target: speed to track [m/s].
         changing: whether a lane change is under way.
+        alert: alert of the previous step, index in :data:`core.authority.alerts.ALERTS`.
         change_weight: share of the weights of a lane change in the longitudinal risk [-].
         felt: the automation's actual command of the previous step, felt at wheel and pedal [m/s^2, rad].
         displayed: alpha_a of the previous step, as displayed to the driver [-].
-        alert: alert of the previous step, index in :data:`core.authority.alerts.ALERTS`.
         neighbours: rows of the follower, the leader and the preceding vehicle, columns PRESENT to NEAR_ROW.
         bodies: half the sum of the lengths of the ego and of the preceding vehicle [m]: the distance between their
             centres minus their gap.
@@ -129,10 +129,10 @@ class Scene:
     y_target: float
     v_target: float
     changing: bool
+    alert: Int32
     change_weight: float
     felt: Vector2
     displayed: float
-    alert: int
     neighbours: Annotated[np.ndarray, (3, 5)]
     bodies: float
     region: Annotated[np.ndarray, (4,)]
@@ -153,13 +153,13 @@ class Signals:
         r_x, r_y: longitudinal and lateral risk [-].
         alpha: authority of the automation over each channel, acceleration and steering [-].
         alpha_a: the smaller of the two [-].
-        alert: what the allocator tells the driver, index in :data:`core.authority.alerts.ALERTS`.
         u_a_act: the automation's actual command.
         u_h_des: the driver's desired command.
         u_h_act: the driver's actual command.
         u: command that drives the vehicle.
         status: outcome of the automation's solver: control.automation.CONVERGED, ITERATION_LIMIT or FAILED.
         iterations: number of Gauss-Newton iterations.
+        alert: what the allocator tells the driver, index in :data:`core.authority.alerts.ALERTS`.
         residual: projected gradient at the solution [-].
     """
 
@@ -174,13 +174,13 @@ class Signals:
     r_y: float
     alpha: Vector2
     alpha_a: float
-    alert: int
     u_a_act: Vector2
     u_h_des: Vector2
     u_h_act: Vector2
     u: Vector2
     status: Int32
     iterations: Int32
+    alert: Int32
     residual: float
 
 

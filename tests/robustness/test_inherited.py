@@ -423,7 +423,7 @@ def test_authorities_of_other_types(alpha_a):
     assert env.step(np.zeros(2))[4]["alpha_a"] == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize("alpha_a", [None, np.nan, [0.5, 0.5], "much"])
+@pytest.mark.parametrize("alpha_a", [None, np.nan, [0.5, 0.5, 0.5], "much"])
 def test_what_is_no_authority_is_named(alpha_a):
     env = AuthorityLimiter(TwoLaneEnv(), Gives(alpha_a))
     env.reset(seed=0)

@@ -411,8 +411,9 @@ class Failing:
     """An allocator whose authority is undefined from the fourth step on."""
 
     @staticmethod
-    def compiled(scene, signals, p):
-        return 0.5 if scene.k < 3 or scene.k > 4 else np.nan
+    def compiled(now):
+        alpha = 0.5 if now.scene.k < 3 or now.scene.k > 4 else np.nan
+        return 1.0, alpha, 0
 
 
 @pytest.mark.parametrize(

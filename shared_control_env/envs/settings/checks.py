@@ -26,7 +26,7 @@ LARGEST_OFFSET = 20.0
 CUT_OFF = 3.0
 """Number of standard deviations at which log-normal draws are cut off [-]."""
 
-RESTING = ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "glance", "response")
+RESTING = ("lane_position", "heading", "headway", "felt_steering", "felt_acceleration", "display", "response")
 """Settings of a person that act only where the hands rest at the start."""
 
 WAYS_TO_DRAW = ({"low", "high"}, {"median", "spread"}, {"choices"})

@@ -43,8 +43,11 @@ LARGEST_STEP = 4.0
 PRIOR = 1e-4
 """Precision of a normal prior on both coefficients, which keeps fits to separated outcomes finite."""
 
-BANDWIDTH = 0.05
-"""Standard deviation of the smoother's kernel, as a share of the largest severity."""
+BANDWIDTHS = (0.01, 0.05)
+"""Smallest and largest standard deviation of the smoother's kernel, as a share of the largest severity.
+
+In between it is half the mean distance of a severity to its neighbours: narrow where the grid was refined.
+"""
 
 FINE = np.linspace(0.0, 1.0, 401)
 """Severities, as shares of the largest, at which a curve is searched for its crossing."""
@@ -215,7 +218,11 @@ def smoothed(x: np.ndarray, kept: np.ndarray, tried: np.ndarray) -> np.ndarray:
     Returns:
         Shape (samples, 401).
     """
-    kernel = np.exp(-0.5 * ((FINE[None, :] - x[:, None]) / BANDWIDTH) ** 2) + 1e-12
+    gaps = np.diff(x)
+    apart = 0.5 * (np.append(gaps, gaps[-1]) + np.insert(gaps, 0, gaps[0]))
+    width = np.clip(0.5 * apart, *BANDWIDTHS)[:, None]
+    kernel = np.exp(-0.5 * ((FINE[None, :] - x[:, None]) / width) ** 2) / width
+    kernel += 1e-9 * np.exp(-np.abs(FINE[None, :] - x[:, None]) / BANDWIDTHS[0])  # between severities far apart
     return (kept @ kernel) / np.maximum(tried @ kernel, 1e-300)
 
 

@@ -65,11 +65,12 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
         return result
 
     def decide(self) -> np.ndarray:
-        """Authorities over both channels of the planned step, shape (2,)."""
-        scene, signals = self.shared.scene, self.shared.signals
-        if self._given is not None:
-            scene, signals = scene.copy(), self.shared.signals_for_allocator()  # copies, which a user may change
-            hide(signals, self.allocator)
-        alphas, alert = decide(self.allocator, scene, signals, self.shared.assessor, "allocator")
-        self.shared.signals["alert"] = alert
+        """alpha_a of the planned step, shape (1,), or the authorities over both channels, shape (2,)."""
+        shared = self.shared
+        if self._given is None:
+            return np.array([self.allocator.allocate(shared.scene, shared.signals)])
+        scene, signals = shared.scene.copy(), shared.signals_for_allocator()  # copies, which a user may change
+        hide(signals, self.allocator)
+        alphas, alert = decide(self.allocator, scene, signals, shared.assessor, "allocator")
+        shared.signals["alert"] = alert
         return alphas

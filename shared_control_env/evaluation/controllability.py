@@ -18,19 +18,25 @@ import pandas as pd
 from shared_control_env.evaluation.catalogue import Authorities, Drivers
 from shared_control_env.evaluation.episodes import Fault
 from shared_control_env.evaluation.margins import (
+    COVERAGE,
     Curves,
     Margin,
     Outcomes,
-    find_dips,
     fit_curves,
     margin_of,
     resampled_weights,
     wilson,
 )
 from shared_control_env.evaluation.ranking import RANKED, rank
-from shared_control_env.evaluation.runner import check_settings, checked_jobs_and_engine, described_entries, run_batches
+from shared_control_env.evaluation.runner import (
+    check_options,
+    check_settings,
+    checked_changes,
+    described_entries,
+    run_batches,
+)
 from shared_control_env.evaluation.sampling import PROBABILITIES, is_settled, wanted
-from shared_control_env.evaluation.severity import COMMISSION, SIZE
+from shared_control_env.evaluation.severity import COMMISSION
 from shared_control_env.evaluation.storage import MARGINS, REPORT, TABLE, ResultsFolder, sorted_table, write_atomically
 from shared_control_env.evaluation.study import (
     Cell,
@@ -100,7 +106,7 @@ def controllability(
             as for :func:`runner.evaluate`.
     """
     study = planned_study(
-        kinds, authority, driver, channel, scenarios, keep, at, last, budget, width, seed, config or {}
+        kinds, authority, driver, channel, scenarios, keep, at, last, budget, width, seed, checked_changes(config)
     )
     return study_controllability(study, out, fresh, jobs, engine, progress).margins
 
@@ -125,7 +131,7 @@ def study_controllability(
     Raises:
         ValueError: as for :func:`controllability`.
     """
-    checked_jobs_and_engine(jobs, engine)
+    check_options(jobs, engine, fresh)
     check_settings(list(batches_of(study, episodes_of(study, coarse(study)))))
     folder = None if out is None else ResultsFolder(Path(out).expanduser(), _manifest(study), fresh)
     try:
@@ -135,6 +141,8 @@ def study_controllability(
             if turn > 0:
                 plan = _refined(study, plan, rows)
             missing = [each for each in episodes_of(study, plan) if each not in rows]
+            if not missing:
+                break
             for batch, found in run_batches(list(batches_of(study, missing)), folder, jobs, engine):
                 for (fault, seed), row in zip(batch.episodes, found, strict=True):
                     rows[Episode(batch.scenario, batch.driver[0], batch.authority[0], fault, seed)] = row
@@ -171,11 +179,12 @@ def _refined(study: Study, plan: Plan, rows: Mapping[Episode, Mapping[str, Any]]
     for cell, levels in plan.items():
         outcomes = outcomes_of(study, cell, levels, rows)
         weights = resampled_weights(len(outcomes.controlled), np.random.default_rng(0), 100)
-        margin = margin_of(outcomes, fit_curves(outcomes, weights), RANKED)
+        curves = fit_curves(outcomes, weights)
+        margin = margin_of(outcomes, curves, RANKED)
         largest = float(outcomes.severities[-1])
         if not is_settled(margin.low, margin.high, largest, study.width):
             ends = np.clip([margin.low, margin.high], 0.0, largest)
-            wishes.append((float(ends[1] - ends[0]) / largest, cell, wanted(outcomes, study.at[cell.axis])))
+            wishes.append((float(ends[1] - ends[0]) / largest, cell, wanted(outcomes, curves, study.at[cell.axis])))
     wishes.sort(key=lambda wish: -wish[0])
     refined = {cell: dict(levels) for cell, levels in plan.items()}
     left = study.budget - len(rows)
@@ -217,7 +226,7 @@ def _named(study: Study, cell: Cell) -> dict[str, Any]:
         "kind": axis.kind,
         "channel": axis.channel,
         "over": axis.over,
-        "meaning": axis.meaning if axis.over == SIZE else "duration",
+        "meaning": axis.meaning,
         "unit": axis.unit,
         "largest": axis.largest,
         "commission": axis.kind in COMMISSION,
@@ -243,7 +252,7 @@ def _margin_row(study: Study, cell: Cell, outcomes: Outcomes, curves: Curves) ->
     row["dips"] = "; ".join(
         f"{dip.severity:.3g} {row['unit']}: {100.0 * dip.share:.0f} %, though {100.0 * dip.later_share:.0f} % at "
         f"{dip.later:.3g} {row['unit']} (p = {dip.p:.1g})"
-        for dip in find_dips(outcomes)
+        for dip in curves.dips
     )
     row["logistic"], row["episodes"] = curves.logistic, int(outcomes.tried.sum())
     margin = Margin(row["s_90"], row["s_90_low"], row["s_90_high"])
@@ -274,7 +283,8 @@ def _point_rows(study: Study, cell: Cell, outcomes: Outcomes) -> Iterator[dict[s
 
 
 def _fitted_row(study: Study, cell: Cell, curves: Curves) -> dict[str, Any]:
-    low, high = np.quantile(curves.worse[1:], 0.025, axis=0), np.quantile(curves.better[1:], 0.975, axis=0)
+    low = np.quantile(curves.worse[1:], 0.5 - 0.5 * COVERAGE, axis=0)
+    high = np.quantile(curves.better[1:], 0.5 + 0.5 * COVERAGE, axis=0)
     return {
         "driver": cell.driver,
         "authority": cell.authority,

@@ -122,8 +122,7 @@ def draw_curves(study: Study, result: Controllability, driver: str) -> Figure:
             panel.scatter(part["severity"], part["share"], s=size, color=look[part["authority"]]["color"], lw=0)
         for level in (0.5, 0.9, 0.99):
             panel.axhline(level, color=INK, lw=0.4, alpha=0.4)
-        meaning = axis.meaning if axis.over == "size" else "duration"
-        panel.set(title=axis.name, xlabel=f"{meaning} [{axis.unit}]", ylim=(-0.03, 1.03), xlim=(0.0, axis.largest))
+        panel.set(title=axis.name, xlabel=f"{axis.meaning} [{axis.unit}]", ylim=(-0.03, 1.03), xlim=(0.0, axis.largest))
         panel.spines[["top", "right"]].set_visible(False)
     for panel in axes[len(study.axes) :]:
         panel.set_visible(False)

@@ -75,21 +75,6 @@ class Outcomes(NamedTuple):
         return np.nansum(self.controlled, axis=0)
 
 
-class Curves(NamedTuple):
-    """Fits to one curve and to its bootstrap samples; row 0 is the fit to the outcomes themselves.
-
-    Attributes:
-        values: P(controlled) at :data:`FINE`, shape (1 + resamples, 401).
-        worse, better: the same with a person who was not seen, and who always fails, or never does.
-        logistic: whether they are logistic curves with a lapse; if not, they are smoothed without an assumption.
-    """
-
-    values: np.ndarray
-    worse: np.ndarray
-    better: np.ndarray
-    logistic: bool
-
-
 class Dip(NamedTuple):
     """A severity that is controlled less than a larger one.
 
@@ -106,6 +91,23 @@ class Dip(NamedTuple):
     later: float
     later_share: float
     p: float
+
+
+class Curves(NamedTuple):
+    """Fits to one curve and to its bootstrap samples; row 0 is the fit to the outcomes themselves.
+
+    Attributes:
+        values: P(controlled) at :data:`FINE`, shape (1 + resamples, 401).
+        worse, better: the same with a person who was not seen, and who always fails, or never does.
+        logistic: whether they are logistic curves with a lapse; if not, they are smoothed without an assumption.
+        dips: severities that are controlled significantly less than a larger one.
+    """
+
+    values: np.ndarray
+    worse: np.ndarray
+    better: np.ndarray
+    logistic: bool
+    dips: list[Dip]
 
 
 class Margin(NamedTuple):
@@ -156,7 +158,7 @@ def resampled_weights(seeds: int, rng: np.random.Generator, resamples: int = RES
     Args:
         seeds: number of seeds.
         rng: generator.
-        resamples: number of samples; 0 for the seeds as they are.
+        resamples: number of samples.
     """
     drawn, unseen = rng.exponential(size=(resamples, seeds)), rng.exponential(size=resamples)
     return Weights(np.concatenate([np.ones((1, seeds)), drawn]), np.concatenate([[0.0], unseen]))
@@ -180,22 +182,11 @@ def fit_curves(outcomes: Outcomes, weights: Weights) -> Curves:
     unseen = weights.unseen[:, None] * outcomes.tried / outcomes.tried.max()
     first = fit_logistic(x, kept[:1], tried[:1])
     freedom = max(1, np.count_nonzero(tried[0]) - 2)
-    logistic = bool(stats.chi2.sf(first[2][0], freedom) >= MISFIT) and not find_dips(outcomes)
+    dips = find_dips(outcomes)
+    logistic = bool(stats.chi2.sf(first[2][0], freedom) >= MISFIT) and not dips
     fit = _logistic_curves if logistic else smoothed
     sets = (fit(x, kept, tried), fit(x, kept, tried + unseen), fit(x, kept + unseen, tried + unseen))
-    return Curves(*sets, logistic)
-
-
-def fit_curve(outcomes: Outcomes) -> np.ndarray:
-    """Fit a curve to the outcomes alone, see :func:`fit_curves`.
-
-    Args:
-        outcomes: outcomes of the curve.
-
-    Returns:
-        P(controlled) at :data:`FINE`, shape (1, 401).
-    """
-    return fit_curves(outcomes, resampled_weights(len(outcomes.controlled), np.random.default_rng(0), 0)).values
+    return Curves(*sets, logistic, dips)
 
 
 def _logistic_curves(x: np.ndarray, kept: np.ndarray, tried: np.ndarray) -> np.ndarray:

@@ -37,15 +37,15 @@ def rank(
 ) -> pd.DataFrame:
     """Geometric mean over the axes of s_90 against each baseline's, and the costs; best first for each driver.
 
+    A margin beyond the grid counts as the largest severity, and one below the coarse grid, or never, as half of its
+    first step: ``censored`` says how many of the margins are so. Both limits pull the mean towards 1. The same
+    bootstrap weights are used for all curves, so that differences are paired.
+
     Args:
         study: the study.
         outcomes, curves: outcomes of every curve, and the fits to them.
         weights: weights of the bootstrap.
         rows: rows of all episodes.
-
-    A margin beyond the grid counts as the largest severity, and one below the coarse grid, or never, as half of its
-    first step: ``censored`` says how many of the margins are so. Both limits pull the mean towards 1. The same
-    bootstrap weights are used for all curves, so that differences are paired.
     """
     table = []
     bounds = np.array([[0.5 * axis.grid[1], axis.largest] for axis in study.axes])[:, :, None]

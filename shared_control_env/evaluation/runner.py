@@ -92,12 +92,8 @@ def evaluate(
     """
     drivers, authorities, chosen = chosen_drivers(driver), chosen_authorities(authority), chosen_suite(suite)
     numbers = _checked_seeds(seeds)
-    checked_jobs_and_engine(jobs, engine)
-    if not isinstance(fresh, bool):
-        raise ValueError(f"fresh = {fresh!r} must be True or False")
-    if config is not None and not isinstance(config, Mapping):
-        raise ValueError(f"config = {config!r} must be a dict")
-    changes = as_plain(config or {})
+    check_options(jobs, engine, fresh)
+    changes = checked_changes(config)
     checked_automation(automation)
     batches = list(plan(chosen, drivers, authorities, numbers, changes, automation))
     check_settings(batches)
@@ -125,19 +121,36 @@ def evaluate(
         folder.close()
 
 
-def checked_jobs_and_engine(jobs: int, engine: str) -> None:
+def check_options(jobs: int, engine: str, fresh: bool) -> None:
     """Check how episodes are to be run.
 
     Args:
         jobs: number of processes.
         engine: one of :data:`ENGINES`.
+        fresh: whether earlier results are removed.
 
     Raises:
-        ValueError: for a wrong number of processes, or an unknown engine.
+        ValueError: for a wrong number of processes, an unknown engine, or a ``fresh`` that is neither True nor False.
     """
     if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
         raise ValueError(f"jobs = {jobs!r} must be an integer of at least 1")
     choose_one("engine", engine, dict.fromkeys(ENGINES))
+    if not isinstance(fresh, bool):
+        raise ValueError(f"fresh = {fresh!r} must be True or False")
+
+
+def checked_changes(config: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Changes to settings in plain types.
+
+    Args:
+        config: the changes; None for none.
+
+    Raises:
+        ValueError: if they are no dict.
+    """
+    if config is not None and not isinstance(config, Mapping):
+        raise ValueError(f"config = {config!r} must be a dict")
+    return as_plain(config or {})
 
 
 def described_entries(drivers: Mapping[str, DriverEntry], authorities: Mapping[str, AuthorityEntry]) -> dict[str, Any]:

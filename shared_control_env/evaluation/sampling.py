@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from shared_control_env.evaluation.margins import FINE, Outcomes, find_dips, first_crossings, fit_curve
+from shared_control_env.evaluation.margins import FINE, Curves, Outcomes, first_crossings
 
 PROBABILITIES = (0.99, 0.9, 0.5)
 """Probabilities of the margins s_99, s_90 and s_50 [-]."""
@@ -25,7 +25,7 @@ MOST_SEVERITIES = 18
 """Largest number of severities of a curve."""
 
 
-def wanted(outcomes: Outcomes, at: float) -> dict[float, int]:
+def wanted(outcomes: Outcomes, curves: Curves, at: float) -> dict[float, int]:
     """Severities that need more episodes, and how many they should have in all.
 
     Four wishes, each from the outcomes alone:
@@ -38,6 +38,7 @@ def wanted(outcomes: Outcomes, at: float) -> dict[float, int]:
 
     Args:
         outcomes: outcomes so far.
+        curves: fits to them.
         at: severity that was asked for; NaN for none.
     """
     s, tried, kept = outcomes.severities, outcomes.tried, outcomes.kept
@@ -55,9 +56,8 @@ def wanted(outcomes: Outcomes, at: float) -> dict[float, int]:
         wishes[float(new)] = 2 * COARSE
         return True
 
-    curve = fit_curve(outcomes)
     for q in PROBABILITIES:
-        x = float(first_crossings(curve, q)[0])
+        x = float(first_crossings(curves.values[:1], q)[0])
         if np.isinf(x):
             more(0 if x < 0.0 else len(s) - 1)
             continue
@@ -69,7 +69,7 @@ def wanted(outcomes: Outcomes, at: float) -> dict[float, int]:
     if at in s:
         more(int(np.flatnonzero(s == at)[0]))
     share = kept / np.maximum(tried, 1)
-    dips = {dip.severity for dip in find_dips(outcomes)}
+    dips = {dip.severity for dip in curves.dips}
     rising = [(share[i:].max() - share[i], i) for i in range(len(s) - 1) if float(s[i]) not in dips]
     rise, low = max(rising, default=(0.0, 0))
     if rise > 0.05:

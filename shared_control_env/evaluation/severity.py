@@ -178,6 +178,8 @@ def axis_of(kind: str, channel: str = "steering", over: str = SIZE, size: float 
     if KINDS[kind].unit is None or over == DURATION:
         if over == DURATION and KINDS[kind].unit is not None:
             size = checked_severity(size, f"size of {kind!r}", largest, unit)
+            if size == 0.0:
+                raise ValueError(f"size of {kind!r} = 0.0 {unit} is no fault that could last; it must be above 0")
         grid = tuple(LONGEST * share for share in (0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0))
         return Axis(kind, channel, DURATION, "s", "duration", LONGEST, None, grid, size)
     grid = tuple(largest * share for share in _SHARES)

@@ -99,7 +99,13 @@ class Study(NamedTuple):
 
 
 class Episode(NamedTuple):
-    """What identifies an episode of a study."""
+    """What identifies an episode of a study.
+
+    Attributes:
+        scenario, driver, authority: names.
+        fault: fault of the episode.
+        seed: its seed.
+    """
 
     scenario: str
     driver: str
@@ -158,7 +164,7 @@ def planned_study(
         graded = [(axis, s) for axis, s in pairs if axis.over == SIZE]
         if any(np.isnan(s) for _, s in graded):
             raise ValueError("last = True needs at, a severity for each kind whose size is graded")
-        pairs += [(axis_of(axis.kind, channel, DURATION, s), np.nan) for axis, s in graded]
+        pairs += [(axis_of(axis.kind, axis.channel, DURATION, s), np.nan) for axis, s in graded]
     where = list(SUITES["full"].scenarios) if scenarios == "all" else list(choose("scenario", scenarios, SCENARIOS))
     for name, value in (("budget", budget), ("seed", seed)):
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:

@@ -87,6 +87,16 @@ def test_how_long_a_fault_may_last():
     assert table["fault"].iloc[1] == "bias of steering for a time, size 0.3"
 
 
+def test_a_kind_keeps_its_own_channel():
+    study = planned_study(
+        ["bias:acceleration"], "none", "hands_on", "steering", "bend", "lane", 2.0, True, 400, 0.1, 0, {}
+    )
+    assert [(axis.channel, axis.over) for axis in study.axes] == [
+        ("acceleration", "size"),
+        ("acceleration", "duration"),
+    ]
+
+
 def test_ranking_has_the_baseline_at_one(small):
     study = planned_study(
         "bias",
@@ -172,10 +182,13 @@ def test_a_label_names_its_fault():
         ({"at": {"delay": 0.1}}, "'delay' is not among the kinds"),
         ({"kinds": ["bias", "delay"], "at": 0.1}, "give one for each kind"),
         ({"kinds": "white_noise", "last": True, "at": {}}, "needs at"),
+        ({"at": 0.0, "last": True}, "no fault that could last"),
         ({"budget": 100}, "budget = 100 episodes is too small.*need 224"),
         ({"budget": 1.5}, "budget = 1.5 must be an integer"),
         ({"width": 0.0}, "width = 0.0 must be a number above 0"),
         ({"jobs": 0}, "jobs = 0"),
+        ({"fresh": "yes"}, "fresh = 'yes' must be True or False"),
+        ({"config": ["ego"]}, "must be a dict"),
         ({"config": {"persons": ["hands_on"]}}, "persons"),
     ],
 )

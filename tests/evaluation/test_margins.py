@@ -22,6 +22,11 @@ def logistic(middle, width, lapse=0.0):
     return lambda s: (1.0 - lapse) / (1.0 + np.exp(np.clip((s - middle) / width, -500.0, 500.0)))
 
 
+def wishes_of(outcomes, at=np.nan):
+    weights = resampled_weights(len(outcomes.controlled), np.random.default_rng(0), 1)
+    return wanted(outcomes, fit_curves(outcomes, weights), at)
+
+
 def study(curve, seed, rounds=5, independent=False):
     """Outcomes of an adaptive study of one curve: every person has a tolerance, or a new one at each severity."""
     rng = np.random.default_rng(seed)
@@ -36,7 +41,7 @@ def study(curve, seed, rounds=5, independent=False):
         return Outcomes(np.array(severities), found)
 
     for _ in range(rounds):
-        for s, n in wanted(outcomes(), np.nan).items():
+        for s, n in wishes_of(outcomes()).items():
             plan[s] = min(max(plan.get(s, 0), n), 400)
     return outcomes()
 
@@ -134,13 +139,13 @@ def test_wilson_by_hand():
 
 def test_what_a_round_wishes_for():
     outcomes = outcomes_of(40, 40, 38, 2, 0, 0)
-    wishes = wanted(outcomes, np.nan)
+    wishes = wishes_of(outcomes)
     new = [s for s in wishes if s not in outcomes.severities]
     assert any(0.4 < s < 0.6 for s in new)  # between 38 and 2 of 40
     assert all(n > 0 for n in wishes.values())
-    asked = wanted(outcomes, 0.2)
+    asked = wishes_of(outcomes, 0.2)
     assert asked[0.2] > 40
-    suspicious = wanted(outcomes_of(40, 34, 40, 40, 40, 40), np.nan)
+    suspicious = wishes_of(outcomes_of(40, 34, 40, 40, 40, 40))
     assert suspicious[0.2] > 40  # lower than what follows: a dip, or chance
 
 

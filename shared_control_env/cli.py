@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -92,42 +92,57 @@ def _in_words(console: Console) -> Iterator[None]:
             raise typer.BadParameter(str(error)) from None
 
 
-@app.command()
-def benchmark(
-    suite: Annotated[str, typer.Option(help=f"One of: {', '.join(SUITES)}.")] = "paper",
-    drivers: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "mpc,scripted,none",
-    authorities: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "all",
-    seeds: Annotated[str, typer.Option(help="Such as 0-9 or 1,2,5.")] = "0-4",
-    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
-    engine: Annotated[str, typer.Option(help="local, or ray for a Ray cluster.")] = "local",
-    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results/benchmark"),
-    fresh: Annotated[bool, typer.Option(help="Remove the results that the folder holds, and begin again.")] = False,
-) -> None:
-    """Run a suite with drivers under authorities; stopped at any moment, it goes on where it was."""
+@contextmanager
+def _running(console: Console, out: Path) -> Iterator[Callable[[int, int], None]]:
+    """Show the progress of episodes whose results go to a folder, and end in words where they cannot go on."""
     from shared_control_env.evaluation.progress import progress_bar
-    from shared_control_env.evaluation.runner import evaluate
 
-    console = Console()
-    out = out.expanduser()
     with _in_words(console), resumable(out), progress_bar(console) as bar:
         task = bar.add_task("episodes", total=None)
         try:
-            table = evaluate(
-                _names(drivers),
-                _names(authorities),
-                suite,
-                seeds=_seeds(seeds),
-                out=out,
-                fresh=fresh,
-                jobs=jobs,
-                engine=engine,
-                progress=lambda done, total: bar.update(task, completed=done, total=total),
-            )
+            yield lambda done, total: bar.update(task, completed=done, total=total)
         except OSError as error:
             bar.stop()
             text = f"{error}: what could be written until then is in {out}; start again to continue."
             console.print(text, style="red", markup=False)
             raise typer.Exit(1) from None
+
+
+Names = Annotated[str, typer.Option(help="Names separated by commas, or all.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
+Engine = Annotated[str, typer.Option(help="local, or ray for a Ray cluster.")]
+Out = Annotated[Path, typer.Option(help="Folder of the results.")]
+Fresh = Annotated[bool, typer.Option(help="Remove the results that the folder holds, and begin again.")]
+
+
+@app.command()
+def benchmark(
+    suite: Annotated[str, typer.Option(help=f"One of: {', '.join(SUITES)}.")] = "paper",
+    drivers: Names = "mpc,scripted,none",
+    authorities: Names = "all",
+    seeds: Annotated[str, typer.Option(help="Such as 0-9 or 1,2,5.")] = "0-4",
+    jobs: Jobs = 1,
+    engine: Engine = "local",
+    out: Out = Path("results/benchmark"),
+    fresh: Fresh = False,
+) -> None:
+    """Run a suite with drivers under authorities; stopped at any moment, it goes on where it was."""
+    from shared_control_env.evaluation.runner import evaluate
+
+    console = Console()
+    out = out.expanduser()
+    with _running(console, out) as progress:
+        table = evaluate(
+            _names(drivers),
+            _names(authorities),
+            suite,
+            seeds=_seeds(seeds),
+            out=out,
+            fresh=fresh,
+            jobs=jobs,
+            engine=engine,
+            progress=progress,
+        )
     console.print(summary(table, console.width), markup=False)
     console.print(f"{len(table)} episodes are in {out / TABLE}; the report is {out / REPORT}.", markup=False)
 
@@ -136,29 +151,27 @@ def benchmark(
 def controllability(
     kinds: Annotated[str, typer.Option(help="Kinds of fault separated by commas, or all.")] = "all",
     channel: Annotated[str, typer.Option(help="steering, acceleration or both.")] = "steering",
-    drivers: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "population",
-    authorities: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "all",
-    scenarios: Annotated[str, typer.Option(help="Names separated by commas, or all.")] = "all",
+    drivers: Names = "population",
+    authorities: Names = "all",
+    scenarios: Names = "all",
     keep: Annotated[str, typer.Option(help="What counts as controlled: lane, road or collision.")] = "lane",
     at: Annotated[str, typer.Option(help="Severity to classify, such as 0.1, or bias=0.1,delay=0.4.")] = "",
     last: Annotated[bool, typer.Option(help="How long a fault of that severity may last, too.")] = False,
     budget: Annotated[int, typer.Option(min=1, help="Largest number of episodes.")] = 20_000,
     width: Annotated[float, typer.Option(help="Wanted width of the intervals, share of the largest severity.")] = 0.1,
     seed: Annotated[int, typer.Option(min=0, help="First seed.")] = 0,
-    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
-    engine: Annotated[str, typer.Option(help="local, or ray for a Ray cluster.")] = "local",
-    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("results/controllability"),
-    fresh: Annotated[bool, typer.Option(help="Remove the results that the folder holds, and begin again.")] = False,
+    jobs: Jobs = 1,
+    engine: Engine = "local",
+    out: Out = Path("results/controllability"),
+    fresh: Fresh = False,
 ) -> None:
     """How large a fault drivers control under each authority; stopped at any moment, it goes on where it was."""
     from shared_control_env.evaluation.controllability import controllability as run_study
     from shared_control_env.evaluation.controllability_report import severity
-    from shared_control_env.evaluation.progress import progress_bar
 
     console = Console()
     out = out.expanduser()
-    with _in_words(console), resumable(out), progress_bar(console) as bar:
-        task = bar.add_task("episodes", total=None)
+    with _running(console, out) as progress:
         table = run_study(
             _names(kinds),
             _names(authorities),
@@ -175,7 +188,7 @@ def controllability(
             fresh=fresh,
             jobs=jobs,
             engine=engine,
-            progress=lambda done, total: bar.update(task, completed=done, total=total),
+            progress=progress,
         )
     printed = Table(title="Largest severity that 90 % control, and its 95 % interval", pad_edge=False)
     for name in ("fault", "driver", "authority", "s_90", "class"):

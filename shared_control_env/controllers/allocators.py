@@ -106,14 +106,24 @@ def decide(
     Args:
         allocator: the allocator.
         scene, signals: as in :meth:`Allocator.allocate`.
-        assess: the :class:`~shared_control_env.controllers.assessor.Assessor` of the environment.
+        assess: the :class:`~shared_control_env.controllers.assessor.Assessor` of the environment; None for an allocator
+            that asks nothing.
         who: name of the allocator for error messages.
 
     Returns:
         As :func:`checked_allocation`.
     """
-    more = (assess,) if getattr(allocator, "needs_assess", False) else ()
+    more = () if assess is None else (assess,)
     return checked_allocation(allocator.allocate(scene, signals, *more), who)
+
+
+def asks(allocator: Allocator) -> bool:
+    """Whether an allocator asks for the risks of commands.
+
+    Args:
+        allocator: the allocator.
+    """
+    return bool(getattr(allocator, "needs_assess", False))
 
 
 def hide(signals: np.ndarray, allocator: Allocator) -> None:

@@ -21,6 +21,9 @@ SLOT_SPACES: dict[str, spaces.Box] = {
 """Space of each slot. ``driver``: u_h,des, desired acceleration and steering as shares of their limits [-].
 ``authority``: alpha_a [-]; two numbers are taken too, as authorities over acceleration and over steering."""
 
+TAKEN = {DRIVER: (2,), AUTHORITY: (1, 2)}
+"""How many numbers each slot takes."""
+
 BOUNDS = {name: (float(s.low[0]), float(s.high[0]), s.shape[0]) for name, s in SLOT_SPACES.items()}
 
 
@@ -124,8 +127,7 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
     low, high, size = BOUNDS[slot]
     array = as_numbers(value)
     values = array.tolist()
-    per_channel = slot == AUTHORITY and array.shape == (2,)
-    if not (array.shape == (size,) or per_channel) or not all(map(isfinite, values)):
+    if array.ndim != 1 or array.size not in TAKEN[slot] or not all(map(isfinite, values)):
         raise ValueError(
             f"action[{slot!r}] = {value!r} must be {size} finite number(s) in [{low:g}, {high:g}], shape ({size},)"
         )

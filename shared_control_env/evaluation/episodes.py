@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 import shared_control_env
-from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, decide, hide, in_kernel
+from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, asks, decide, hide, in_kernel
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.parameters import PERSONS, TRAFFIC_BODY
@@ -372,7 +372,8 @@ class Policies:
         self._names = f"driver {batch.driver[0]!r}", f"authority {batch.authority[0]!r}"
         self._drivers: list[Driver] = [make_driver() for _ in seeds] if make_driver else []
         self._allocators: list[Allocator] = [] if bound else [make_allocator() for _ in seeds]
-        self._assessors = [] if bound else env.assessors()
+        asked = bool(self._allocators) and asks(self._allocators[0])
+        self._assessors = env.assessors() if asked else [None] * len(seeds)
         for seed, *policies in zip(seeds, *(each for each in (self._drivers, self._allocators) if each), strict=True):
             for policy in policies:
                 policy.reset(seed=seed)

@@ -15,7 +15,7 @@ from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.scenarios import Scenario
 from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.settings import OWN_TRAFFIC, Settings
-from shared_control_env.envs.slots import AUTHORITY, BOUNDS, DRIVER, SLACK, Clipping
+from shared_control_env.envs.slots import AUTHORITY, BOUNDS, DRIVER, SLACK, TAKEN, Clipping
 
 ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_vehicles_type", "reward_terms")
 """Settings that must be equal in all environments."""
@@ -72,8 +72,7 @@ class OpenSlots:
         for slot in self.slots:
             low, high, size = BOUNDS[slot]
             array = _numbers(given[slot])
-            per_channel = slot == AUTHORITY and array is not None and array.shape == (n, 2)
-            if array is None or not (array.shape == (n, size) or per_channel):
+            if array is None or array.shape not in [(n, taken) for taken in TAKEN[slot]]:
                 what = f"shape {array.shape}" if array is not None else f"the value {given[slot]!r}"
                 raise ValueError(f"actions[{slot!r}] has {what}; it must be numbers of shape ({n}, {size})")
             finite = np.isfinite(array)

@@ -8,7 +8,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
-from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, decide, hide
+from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority, asks, decide, hide
 from shared_control_env.controllers.driver import check_reset
 from shared_control_env.envs.slots import AUTHORITY
 from shared_control_env.wrappers.slot_wrapper import SlotWrapper
@@ -71,6 +71,7 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
             return np.array([self.allocator.allocate(shared.scene, shared.signals)])
         scene, signals = shared.scene.copy(), shared.signals_for_allocator()  # copies, which a user may change
         hide(signals, self.allocator)
-        alphas, alert = decide(self.allocator, scene, signals, shared.assessor, "allocator")
+        assess = shared.assessor if asks(self.allocator) else None
+        alphas, alert = decide(self.allocator, scene, signals, assess, "allocator")
         shared.signals["alert"] = alert
         return alphas

@@ -21,10 +21,9 @@ from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import combined
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, SUITES, choose_one
-from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS, EpisodeBatch, Fault, settings_of
+from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS, EpisodeBatch, fault_named, settings_of
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
-from shared_control_env.evaluation.severity import parse_fault
 from shared_control_env.evaluation.storage import MARGINS, REPORT, TABLE
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
@@ -270,11 +269,7 @@ def replay(
             # First of all, since what it imports may add the scenario or the degradation.
             first, second, config, automation = entries_of(source.expanduser(), driver, authority)
         choose_one("scenario", scenario, SCENARIOS)
-        given: Fault = None if degradation == AS_GIVEN else degradation
-        if ":" in degradation:
-            given = parse_fault(degradation)
-        else:
-            choose_one("degradation", degradation, {AS_GIVEN: None, **DEGRADATIONS})
+        given = fault_named(degradation)
         frames: list[Any] | None = None if video is None else []
         pair = (driver, first), (authority, second)
         batch = EpisodeBatch(scenario, *pair, ((given, seed),), config, automation)
@@ -288,6 +283,38 @@ def replay(
     if place is not None and frames is not None:
         record(frames, place, frequency)
         console.print(f"The video is {video}.", markup=False)
+
+
+@app.command()
+def drive(
+    scenario: Annotated[str, typer.Option(help="Scenario that is chosen at first.")] = "lane_change",
+    degradation: Annotated[str, typer.Option(help="Degradation; own; or kind:channel:size:duration.")] = "bias_ramp",
+    authority: Annotated[str, typer.Option(help="Authority.")] = "proportional",
+    seed: Annotated[int, typer.Option(min=0, help="Seed.")] = 0,
+    wheel: Annotated[str, typer.Option(help="Part of the name of a wheel to read natively, or any.")] = "",
+    out: Annotated[Path, typer.Option(help="Folder of the recordings.")] = Path("results/drives"),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 for any.")] = 8642,
+    browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+) -> None:
+    """Take the wheel: serves a page on this machine on which you drive, by keyboard, gamepad or wheel."""
+    with _needs("drive"):
+        from shared_control_env.drive import run
+        from shared_control_env.drive.session import Choice
+
+    console = Console()
+    with _in_words(console):
+        choice = Choice(scenario, degradation, authority, "", seed)
+        run.drive(choice, out.expanduser(), port, browser, wheel, console)
+
+
+@contextmanager
+def _needs(extra: str) -> Iterator[None]:
+    """Turn a missing package into a command-line error that names the extra."""
+    try:
+        yield
+    except ImportError as error:
+        text = f'this command needs the extra "{extra}": pip install "shared_control_env[{extra}]" ({error})'
+        raise typer.BadParameter(text) from None
 
 
 def _checked_video(path: Path) -> Path:

@@ -166,8 +166,11 @@ def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memor
     The lag advances after u is formed, so u_h,des first has an effect in the next time step. Hands at rest go along
     with the automation, u_h,des = u_a,act, so that the arm adds nothing.
 
+    A direct driver gives u_h,act itself, which acts at once. Its u_h,des is then the command for which Eq. 16 with
+    K_h = 1 comes to rest at u_h,act: u_a,act + u_h,act.
+
     Args:
-        u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad], shape (2,).
+        u_h_des: the driver's desired command ``[a, delta]`` [m/s^2, rad]; u_h,act if the driver is direct, shape (2,).
         p: parameters.
         scene: record of :data:`records.SCENE`; ``felt`` (u_a,act), ``displayed`` (alpha_a) and ``alert`` are
             written.
@@ -176,11 +179,16 @@ def apply_driver(u_h_des: np.ndarray, p: Parameters, scene: Scene, memory: Memor
     """
     for i in range(2):
         bound = p.limits.a_max if i == 0 else p.limits.delta_max
-        signals.u_h_des[i] = signals.u_a_act[i] if memory.resting else u_h_des[i]
+        if p.lag.direct:
+            memory.u_h_act[i] = u_h_des[i]
+            signals.u_h_des[i] = signals.u_a_act[i] + u_h_des[i]
+        else:
+            signals.u_h_des[i] = signals.u_a_act[i] if memory.resting else u_h_des[i]
         signals.u_h_act[i] = memory.u_h_act[i]
         signals.u[i] = min(max(signals.u_a_act[i] + signals.u_h_act[i], -bound), bound)
         memory.u_h_des[i], memory.u[i], scene.felt[i] = signals.u_h_des[i], signals.u[i], signals.u_a_act[i]
-    advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
+    if not p.lag.direct:
+        advance_lag(memory.u_h_act, signals.u_h_des, signals.u_a_act, p.task.dt, p.lag)
     scene.displayed, scene.alert = signals.alpha_a, signals.alert
 
 

@@ -223,10 +223,13 @@ class DriverLagParameters(NamedTuple):
     Attributes:
         K_h: proportional gain [-]; paper, Section VI. With 0 the driver's hands are off the wheel.
         T_h: time constant [s]; paper, Section VI.
+        direct: whether the driver's slot takes u_h,act itself, without Eq. 16: for a person at the controls, whose own
+            arm has the lag already; ours.
     """
 
     K_h: Annotated[float, Interval(ge=0.0, le=100.0)] = 1.0
     T_h: Positive = 0.2
+    direct: bool = False
 
 
 class InternalModelParameters(NamedTuple):
@@ -343,8 +346,8 @@ def fitted_arms() -> tuple[tuple[float, float], tuple[float, float]]:
     """
     five = [lag for name, lag in IDENTIFIED_DRIVERS.items() if name != "average"]
     fits = []
-    for values in zip(*five, strict=True):
-        logarithms = [math.log(value) for value in values]
+    for field in ("K_h", "T_h"):
+        logarithms = [math.log(getattr(lag, field)) for lag in five]
         fits.append((math.exp(statistics.mean(logarithms)), statistics.stdev(logarithms)))
     return fits[0], fits[1]
 

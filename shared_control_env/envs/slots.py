@@ -18,11 +18,18 @@ SLOT_SPACES: dict[str, spaces.Box] = {
     DRIVER: spaces.Box(-1.0, 1.0, shape=(2,), dtype=np.float32),
     AUTHORITY: spaces.Box(0.0, 1.0, shape=(1,), dtype=np.float32),
 }
-"""Space of each slot. ``driver``: u_h,des, desired acceleration and steering as shares of their limits [-].
+"""Space of each slot. ``driver``: u_h,des, desired acceleration and steering as shares of their limits [-]; u_h,act if
+``config["driver_lag"]["direct"]`` says so.
 ``authority``: alpha_a [-]; two numbers are taken too, as authorities over acceleration and over steering."""
 
 TAKEN = {DRIVER: (2,), AUTHORITY: (1, 2)}
 """How many numbers each slot takes."""
+
+NOT_DIRECT = (
+    "config['driver_lag']['direct'] = True does not go with the predictive driver, which decides on u_h,des; it needs an "
+    "open driver's slot, or a driver of your own that gives u_h,act"
+)
+"""Error message for a direct driver's slot that the predictive driver fills."""
 
 BOUNDS = {name: (float(s.low[0]), float(s.high[0]), s.shape[0]) for name, s in SLOT_SPACES.items()}
 

@@ -91,7 +91,8 @@ class Suite(NamedTuple):
 
 
 def _lag(name: str) -> dict[str, Any]:
-    return {"driver_lag": IDENTIFIED_DRIVERS[name]._asdict()}
+    lag = IDENTIFIED_DRIVERS[name]
+    return {"driver_lag": {"K_h": lag.K_h, "T_h": lag.T_h}}
 
 
 _ARMS = tuple(

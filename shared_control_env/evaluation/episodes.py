@@ -20,12 +20,13 @@ from shared_control_env.controllers.automation import Planner
 from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.parameters import PERSONS, TRAFFIC_BODY
 from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
+from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import Settings, change, combined, defaults, plain
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
-from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite
+from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite, choose_one
 from shared_control_env.evaluation.metrics import Trajectory, measure_all
-from shared_control_env.evaluation.severity import GradedFault
+from shared_control_env.evaluation.severity import GradedFault, parse_fault
 from shared_control_env.vector.environment import SharedControlVectorEnv
 
 LARGEST_BATCH = 170
@@ -202,31 +203,33 @@ def versions() -> str:
     return ", ".join(["python " + python_version(), *parts, f"sources {source_digest()}"])
 
 
-def bound_allocator(batch: EpisodeBatch) -> bool | Allocator:
+def bound_allocator(batch: EpisodeBatch, single: bool = False) -> bool | Allocator:
     """The allocator that the environments of a batch bind; False if it decides from outside.
 
     Args:
         batch: the batch.
+        single: whether each episode has a single environment.
     """
     allocator = batch.authority[1].make()
-    if batch.automation is None:
+    if not single and batch.automation is None:
         return allocator if in_kernel(allocator) else False
     return isinstance(allocator, FuzzyAuthority) and allocator.operators is None
 
 
-def make_environment(batch: EpisodeBatch, n: int, render_mode: str | None = None) -> Any:
+def make_environment(batch: EpisodeBatch, n: int, render_mode: str | None = None, single: bool = False) -> Any:
     """Environments for n episodes of a batch. Slots are bound if their driver or allocator runs in the kernel.
 
     Args:
         batch: the batch.
         n: number of environments.
         render_mode: ``rgb_array`` or None.
+        single: whether each episode has a single environment, as it has with a user-defined automation.
     """
-    limiter, driver = bound_allocator(batch), batch.driver[1].make is None
-    if batch.automation is not None:
+    limiter, driver = bound_allocator(batch, single), batch.driver[1].make is None
+    if single or batch.automation is not None:
         from shared_control_env.evaluation.one_by_one import SingleEnvironments  # needs highway-env
 
-        automations = [batch.automation() for _ in range(n)]
+        automations = [None if batch.automation is None else batch.automation() for _ in range(n)]
         return SingleEnvironments(
             batch.scenario,
             automations,
@@ -362,13 +365,14 @@ class Policies:
         batch: the batch.
         seeds: seed of each environment.
         env: environments of the batch, after their reset.
+        single: whether each episode has a single environment.
     """
 
-    def __init__(self, batch: EpisodeBatch, seeds: Sequence[int], env: Any) -> None:
+    def __init__(self, batch: EpisodeBatch, seeds: Sequence[int], env: Any, single: bool = False) -> None:
         self._env, self._scenes = env, env.views()
         self._limits = np.array([[each.limits.a_max, each.limits.delta_max] for each in env.episodes])
         make_driver, make_allocator = batch.driver[1].make, batch.authority[1].make
-        bound = bool(bound_allocator(batch))
+        bound = bool(bound_allocator(batch, single))
         self._names = f"driver {batch.driver[0]!r}", f"authority {batch.authority[0]!r}"
         self._drivers: list[Driver] = [make_driver() for _ in seeds] if make_driver else []
         self._allocators: list[Allocator] = [] if bound else [make_allocator() for _ in seeds]
@@ -414,6 +418,84 @@ def _records(array: np.ndarray) -> list[np.ndarray]:
     return [array[i : i + 1].reshape(()) for i in range(len(array))]
 
 
+class RunningBatch:
+    """The episodes of a batch, driven step by step.
+
+    Args:
+        batch: the batch.
+        render_mode: ``rgb_array`` or None.
+        single: whether each episode has a single environment; the others share a vectorised one.
+
+    Attributes:
+        batch: the batch.
+        env: the environments.
+        configs: changes to the scenario's settings, by environment.
+        drawn: settings of each episode, with all random values drawn.
+        recorder: what the metrics need.
+        observations, rewards, terminations, truncations, infos: what the environments gave last.
+    """
+
+    def __init__(self, batch: EpisodeBatch, render_mode: str | None = None, single: bool = False) -> None:
+        changes = {fault: settings_of(batch, fault) for fault, _ in batch.episodes}
+        configs, seeds = [changes[fault] for fault, _ in batch.episodes], [seed for _, seed in batch.episodes]
+        self._twins, added = _twins(batch)
+        for fault, seed in added:
+            configs.append(without_fault(batch, fault))
+            seeds.append(seed)
+        self.batch, self.configs = batch, configs
+        self.env = make_environment(batch, len(seeds), render_mode, single)
+        self.observations, self.infos = self.env.reset(seed=seeds, options={"config": configs})
+        self.drawn = self.env.episodes
+        self._steps = max(episode.steps for episode in self.drawn)  # they are equal in the kernel
+        self.recorder, self._policies = Recorder(self._steps, len(seeds)), Policies(batch, seeds, self.env, single)
+        self.rewards, self._k = np.zeros(len(seeds)), 0
+        self.terminations, self.truncations = np.zeros((2, len(seeds)), dtype=bool)
+
+    def step(self) -> bool:
+        """Drive one time step in every episode that is not over.
+
+        Returns:
+            Whether any episode goes on.
+        """
+        action = self._policies.decide(self.observations)
+        outcome = self.env.step(action)
+        self.observations, self.rewards, self.terminations, self.truncations, self.infos = outcome
+        ended = self.terminations | self.truncations
+        going = self.recorder.note(self._k, self.infos, ended, self.env.scenes)
+        self._k += 1
+        return going and self._k < self._steps
+
+    def rows(self, wall_time: float) -> list[dict[str, Any]]:
+        """One row per episode of the batch, see :func:`run`.
+
+        Args:
+            wall_time: computing time of each episode [s].
+        """
+        made_with, recorder, drawn = versions(), self.recorder, self.drawn
+        return [
+            {
+                "scenario": self.batch.scenario,
+                "degradation": name_of(fault),
+                "driver": self.batch.driver[0],
+                "authority": self.batch.authority[0],
+                "seed": seed,
+                "terminated": bool(recorder.crashed[i] or recorder.left_road[i]),
+                "duration": recorder.lengths[i] / drawn[i].policy_frequency,
+                "K_h": drawn[i].driver_lag.K_h,
+                "T_h": drawn[i].driver_lag.T_h,
+                "person": person_of(drawn[i]),
+                "response": recorder.response[i],
+                "noticed": recorder.noticed[i],
+                **fault_of(drawn[i]),
+                **measure_all(recorder.trajectory(i, drawn[i], wall_time, self._twins.get((fault, seed)))),
+                "config_hash": config_hash(self.batch.scenario, self.configs[i]),
+                "version": version("shared_control_env"),
+                "versions": made_with,
+            }
+            for i, (fault, seed) in enumerate(self.batch.episodes)
+        ]
+
+
 def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dict[str, Any]]:
     """Run a batch.
 
@@ -426,49 +508,29 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
         time and the time at which a person at rest noticed something [s], all metrics, and the versions.
     """
     begin = perf_counter()
-    n = len(batch.episodes)
-    changes = {fault: settings_of(batch, fault) for fault, _ in batch.episodes}
-    configs, seeds = [changes[fault] for fault, _ in batch.episodes], [seed for _, seed in batch.episodes]
-    twins, added = _twins(batch)
-    for fault, seed in added:
-        configs.append(without_fault(batch, fault))
-        seeds.append(seed)
-    env = make_environment(batch, len(seeds), None if frames is None else "rgb_array")
-    observations, _ = env.reset(seed=seeds, options={"config": configs})
-    drawn = env.episodes
-    steps = max(episode.steps for episode in drawn)  # they are equal in the kernel
-    recorder, policies = Recorder(steps, len(seeds)), Policies(batch, seeds, env)
-    for k in range(steps):
+    running = RunningBatch(batch, None if frames is None else "rgb_array")
+    going = True
+    while going:
         if frames is not None:
-            frames.extend((env.render() or ())[:n])
-        action = policies.decide(observations)
-        observations, _, terminations, truncations, infos = env.step(action)
-        if not recorder.note(k, infos, terminations | truncations, env.scenes):
-            break
-    env.close()
-    wall_time = (perf_counter() - begin) / len(seeds)
-    made_with = versions()
-    return [
-        {
-            "scenario": batch.scenario,
-            "degradation": name_of(fault),
-            "driver": batch.driver[0],
-            "authority": batch.authority[0],
-            "seed": seed,
-            "terminated": bool(recorder.crashed[i] or recorder.left_road[i]),
-            "duration": recorder.lengths[i] / drawn[i].policy_frequency,
-            **plain(drawn[i])["driver_lag"],
-            "person": person_of(drawn[i]),
-            "response": recorder.response[i],
-            "noticed": recorder.noticed[i],
-            **fault_of(drawn[i]),
-            **measure_all(recorder.trajectory(i, drawn[i], wall_time, twins.get((fault, seed)))),
-            "config_hash": config_hash(batch.scenario, configs[i]),
-            "version": version("shared_control_env"),
-            "versions": made_with,
-        }
-        for i, (fault, seed) in enumerate(batch.episodes)
-    ]
+            frames.extend((running.env.render() or ())[: len(batch.episodes)])
+        going = running.step()
+    running.env.close()
+    return running.rows((perf_counter() - begin) / len(running.configs))
+
+
+def fault_named(name: str) -> Fault:
+    """The fault of a name, as :func:`name_of` gives it.
+
+    Args:
+        name: key of :data:`envs.degradations.DEGRADATIONS`, ``own`` or ``kind:channel:size:duration``.
+
+    Raises:
+        ValueError: for an unknown name, with the nearest one, or for a size that its kind does not allow.
+    """
+    if isinstance(name, str) and ":" in name:
+        return parse_fault(name)
+    choose_one("degradation", name, {AS_GIVEN: None, **DEGRADATIONS})
+    return None if name == AS_GIVEN else name
 
 
 def name_of(fault: Fault) -> str:

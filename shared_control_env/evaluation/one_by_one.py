@@ -1,4 +1,4 @@
-"""Episodes in single environments, one after the other, for an automation that the kernel cannot run."""
+"""Episodes in single environments, one after the other: for an automation in Python, or for a person at the wheel."""
 
 from __future__ import annotations
 
@@ -20,55 +20,59 @@ class SingleEnvironments:
 
     Args:
         scenario: key of :data:`envs.scenarios.SCENARIOS`.
-        automations: one automation for each environment, with ``reset()`` and ``act(scene)``.
+        automations: one automation for each environment, with ``reset()`` and ``act(scene)``; None for the predictive
+            controller.
         config: changes to the scenario's settings.
         limiter: whether the fuzzy inference decides alpha_a.
         driver: whether the predictive driver of the settings drives, solved by OSQP.
         render_mode: ``rgb_array`` or None.
+
+    Attributes:
+        environments: the environments.
     """
 
     def __init__(
         self,
         scenario: str,
-        automations: Sequence[Planner],
+        automations: Sequence[Planner | None],
         config: Mapping[str, Any],
         limiter: bool,
         driver: bool,
         render_mode: str | None = None,
     ) -> None:
-        self._envs: list[Any] = []
+        self.environments: list[Any] = []
         for automation in automations:
             env = Limited(scenario)(dict(config), render_mode, limiter, automation)
-            self._envs.append(DriverModel(env) if driver else env)
-        self._ended = np.zeros(len(self._envs), dtype=bool)
-        self._results: list[Any] = [None] * len(self._envs)
+            self.environments.append(DriverModel(env) if driver else env)
+        self._ended = np.zeros(len(self.environments), dtype=bool)
+        self._results: list[Any] = [None] * len(self.environments)
 
     @property
     def config(self) -> dict[str, Any]:
         """Settings of the first environment."""
-        return self._envs[0].unwrapped.config
+        return self.environments[0].unwrapped.config
 
     @property
     def episodes(self) -> tuple[Settings, ...]:
         """Settings of each episode, with all random values drawn."""
-        return tuple(env.unwrapped.episode for env in self._envs)
+        return tuple(env.unwrapped.episode for env in self.environments)
 
     def views(self) -> list[np.ndarray]:
         """Scenes as read-only 0-d records, which always show the present step."""
-        return [read_only(env.unwrapped.scene) for env in self._envs]
+        return [read_only(env.unwrapped.scene) for env in self.environments]
 
     @property
     def scenes(self) -> np.ndarray:
         """The perceived scene of each environment, records of :data:`core.records.SCENE`, shape (N,)."""
-        return np.array([env.unwrapped.scene for env in self._envs])
+        return np.array([env.unwrapped.scene for env in self.environments])
 
     def signals_for_allocators(self) -> np.ndarray:
         """Signals with each driver's present u_h,act, records of :data:`core.records.SIGNALS`, shape (N,)."""
-        return np.array([env.unwrapped.signals_for_allocator() for env in self._envs])
+        return np.array([env.unwrapped.signals_for_allocator() for env in self.environments])
 
     def assessors(self) -> list[Assessor]:
         """Answers to allocators' questions about the present step of each environment."""
-        return [env.unwrapped.assessor for env in self._envs]
+        return [env.unwrapped.assessor for env in self.environments]
 
     def show_alerts(self, alerts: np.ndarray) -> None:
         """Show each driver the alert of an allocator.
@@ -76,7 +80,7 @@ class SingleEnvironments:
         Args:
             alerts: indices in :data:`core.authority.alerts.ALERTS`, shape (N,).
         """
-        for env, alert in zip(self._envs, alerts, strict=True):
+        for env, alert in zip(self.environments, alerts, strict=True):
             env.unwrapped.signals["alert"] = alert
 
     def reset(self, *, seed: Sequence[int], options: Mapping[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
@@ -89,7 +93,7 @@ class SingleEnvironments:
         Returns:
             Observations and infos, one row per environment.
         """
-        for i, (env, own, config) in enumerate(zip(self._envs, seed, options["config"], strict=True)):
+        for i, (env, own, config) in enumerate(zip(self.environments, seed, options["config"], strict=True)):
             observation, info = env.reset(seed=own, options={"config": config})
             self._results[i] = observation, 0.0, False, False, info
         self._ended[:] = False
@@ -107,7 +111,7 @@ class SingleEnvironments:
         """
         for i in np.flatnonzero(~self._ended):
             action = {slot: rows[i] for slot, rows in actions.items()} if isinstance(actions, dict) else actions[i]
-            self._results[i] = self._envs[i].step(action)
+            self._results[i] = self.environments[i].step(action)
             self._ended[i] = self._results[i][2] or self._results[i][3]
         return self._stacked()
 
@@ -118,11 +122,11 @@ class SingleEnvironments:
 
     def render(self) -> tuple[np.ndarray, ...]:
         """A picture of each environment."""
-        return tuple(env.render() for env in self._envs)
+        return tuple(env.render() for env in self.environments)
 
     def close(self) -> None:
         """Close all environments."""
-        for env in self._envs:
+        for env in self.environments:
             env.close()
 
 

@@ -37,7 +37,7 @@ from shared_control_env.envs import settings as configuration
 from shared_control_env.envs.episode import draw_episode, is_random
 from shared_control_env.envs.scenarios import ENTRY, SCENARIOS, Scenario
 from shared_control_env.envs.settings import Settings
-from shared_control_env.envs.slots import AUTHORITY, DRIVER, SLOT_SPACES, observation_space, space_of
+from shared_control_env.envs.slots import AUTHORITY, DRIVER, NOT_DIRECT, SLOT_SPACES, observation_space, space_of
 from shared_control_env.envs.starts import enlarged, refresh_addresses, sizes_for, start_of, write_start
 from shared_control_env.vector.checks import (
     Actions,
@@ -129,7 +129,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._mode, self.render_mode = checked_mode(autoreset_mode), render_mode
         self._driver = bool(driver)
         settings = settings_for_kernel(scenario, {} if config is None else config)
-        self._check_person([settings])
+        self._check_driver([settings])
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self._observation = OBSERVATIONS[settings.observation.type]
         self._define_spaces()
@@ -290,7 +290,7 @@ class SharedControlVectorEnv(VectorEnv):
         changed = None if config is None else changed_settings(config, self._settings, self._templates)
         generators = checked_generators(seed, self.num_envs)
         if changed is not None:
-            self._check_person([changed[0], *changed[1]])
+            self._check_driver([changed[0], *changed[1]])
             self._adopt(*changed)
         for i in np.flatnonzero(mask).tolist():
             seeded = generators[i]
@@ -381,8 +381,10 @@ class SharedControlVectorEnv(VectorEnv):
         frames = [self._pictures.draw(i, self._episodes[i], self._batch) for i in range(self._pictures.drawn)]
         return None if self.render_mode == "human" else tuple(frames)
 
-    def _check_person(self, present: Sequence[Settings]) -> None:
-        """Raise ValueError if any of the settings has a person but the driver's slot is open."""
+    def _check_driver(self, present: Sequence[Settings]) -> None:
+        """Raise ValueError if any of the settings has a person but the driver's slot is open, or is direct but bound."""
+        if self._driver and any(settings.driver_lag.direct for settings in present):
+            raise ValueError(NOT_DIRECT)
         if not self._driver and any(settings.has_person for settings in present):
             raise ValueError("the person in config['person'] or config['persons'] would not act: it needs driver=True")
 
@@ -426,7 +428,7 @@ class SharedControlVectorEnv(VectorEnv):
         """
         settings, templates = changed_settings(config, self._settings, self._templates)
         check_shared_settings(settings, self._settings)
-        self._check_person([settings, *templates])
+        self._check_driver([settings, *templates])
         if not self._started:
             self._adopt(settings, templates)
             return

@@ -11,7 +11,7 @@ from gymnasium.utils import RecordConstructorArgs
 
 from shared_control_env.controllers.driver import Driver, PersonDriver, check_reset, checked_command, driver_of
 from shared_control_env.envs.settings import parameters_of
-from shared_control_env.envs.slots import DRIVER
+from shared_control_env.envs.slots import DRIVER, NOT_DIRECT
 from shared_control_env.wrappers.slot_wrapper import SlotWrapper
 
 
@@ -44,7 +44,7 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         if driver is not None:
             check_reset(driver, f"driver = {driver!r}")
         self._given = driver
-        self._check_person()
+        self._check_driver()
         self.driver: Driver = driver_of(parameters_of(self.shared.episode)) if driver is None else driver
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -58,7 +58,7 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
             ValueError: as for the environment; or for a person in the settings if a driver was given.
         """
         observation, info = self.env.reset(seed=seed, options=options)
-        self._check_person()
+        self._check_driver()
         if self._given is None:
             self.driver = driver_of(parameters_of(self.shared.episode))
         (own,) = self.shared.np_random.spawn(1)  # spawning leaves the environment's own draws unchanged
@@ -74,8 +74,10 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
         observation, reward, terminated, truncated, info = self.env.step(self.action(action))
         return observation, reward, terminated, truncated, {**info, **self._report()}
 
-    def _check_person(self) -> None:
-        """Raise ValueError if the settings have a person but a driver was given."""
+    def _check_driver(self) -> None:
+        """Raise ValueError if the settings have a person but a driver was given, or are direct but none was."""
+        if self._given is None and self.shared.settings.driver_lag.direct:
+            raise ValueError(NOT_DIRECT)
         if self._given is not None and self.shared.settings.has_person:
             raise ValueError(
                 "the person in config['person'] or config['persons'] would not act: another driver is given"

@@ -390,13 +390,16 @@ def _check_idle(settings: Settings) -> None:
         lane = settings.ego.lane
         raise ValueError(f"config['lane_change']['lane'] = {lane} would not act: the ego is in that lane")
     for field in ("K_h", "T_h"):
-        model = settings.internal_model
+        arm, model = settings.driver_lag, settings.internal_model
+        _refuse_idle("config['driver_lag']", arm, field, not arm.direct, "a direct driver has an arm of its own")
         _refuse_idle(
             "config['internal_model']", model, field, model.active, "the driver has no internal model (active)"
         )
     for field in type(settings.person).model_fields:
         reason = "config['persons'] says who drives"
         _refuse_idle("config['person']", settings.person, field, field == "seed" or not settings.persons, reason)
+    if settings.driver_lag.direct and settings.has_person:
+        raise ValueError("config['driver_lag']['direct'] = True: the person in the settings has an arm with a lag")
     person, longest = settings.person, (MAX_DELAY - 1) / settings.policy_frequency
     if person.delay > longest:
         raise ValueError(f"config['person']['delay'] = {person.delay} s must lie in [0, {longest:g}] at this frequency")

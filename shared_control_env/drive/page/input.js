@@ -1,0 +1,123 @@
+// Keyboard, gamepad and wheel: raw readings, and the calibration of axes.
+
+const KEYS = { ArrowLeft: 0, ArrowRight: 1, ArrowUp: 2, ArrowDown: 3, a: 0, d: 1, w: 2, s: 3 };
+const STORE = "shared_control_env calibration ";
+
+export class Input {
+  constructor() {
+    this.keys = [0, 0, 0, 0];
+    this.device = "keyboard";
+    this.calibration = null;
+    addEventListener("keydown", (event) => this.key(event, 1));
+    addEventListener("keyup", (event) => this.key(event, 0));
+    addEventListener("blur", () => this.keys.fill(0));
+  }
+
+  key(event, value) {
+    const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    if (!(name in KEYS) || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
+    this.keys[KEYS[name]] = value;
+    event.preventDefault();
+  }
+
+  // Raw readings of the chosen device alone; null while it is not there.
+  readings() {
+    if (this.device === "keyboard") return [...this.keys];
+    const pad = connected();
+    return pad ? axesOf(pad) : null;
+  }
+
+  choose(device) {
+    this.device = device;
+    this.calibration = null;
+    const pad = connected();
+    if (device !== "keyboard" && pad) {
+      const kept = localStorage.getItem(STORE + device + pad.id);
+      if (kept) this.calibration = JSON.parse(kept);
+    }
+  }
+
+  keep(calibration) {
+    this.calibration = calibration;
+    localStorage.setItem(STORE + calibration.device + calibration.name, JSON.stringify(calibration));
+  }
+}
+
+export const connected = () => [...navigator.getGamepads()].find((pad) => pad && pad.connected) || null;
+
+// Axes, then buttons as axes from 0 to 1: the pedals of some devices are buttons.
+const axesOf = (pad) => [...pad.axes, ...pad.buttons.map((button) => button.value)].slice(0, 32).map((v) => Math.max(-1, Math.min(1, v)));
+
+const STEPS = [
+  ["left", "Turn the wheel, or push the stick, fully to the left and hold it there."],
+  ["right", "Now fully to the right, and hold it there."],
+  ["centre", "Let go, so that it stands straight."],
+  ["throttle", "Press the accelerator fully and hold it."],
+  ["released", "Release it."],
+  ["brake", "Press the brake fully and hold it."],
+  ["free", "Release it."],
+];
+
+// Asks for movements one after the other and finds the axes that moved. Ends with a calibration, or null.
+export async function calibrate(card, device) {
+  const samples = {};
+  const pad = connected();
+  if (!pad) {
+    await say(card, "No gamepad or wheel is found", "Connect it and press one of its buttons: browsers show it only then.", ["Back"]);
+    return null;
+  }
+  for (const [name, text] of STEPS) {
+    if ((await say(card, `Calibration of ${pad.id}`, text, ["Next", "Cancel"])) === "Cancel") return null;
+    samples[name] = axesOf(connected() || pad);
+  }
+  try {
+    return { device, name: pad.id.slice(0, 150), dead_zone: device === "gamepad" ? 0.08 : 0, ...found(samples) };
+  } catch (error) {
+    await say(card, "That did not work", `${error.message} Try again.`, ["Back"]);
+    return null;
+  }
+}
+
+// The axes of steering and pedals, from the readings at each step.
+export function found(samples) {
+  const moved = (a, b, but = []) => {
+    const changes = a.map((value, i) => (but.includes(i) ? 0 : Math.abs(value - b[i])));
+    const best = changes.indexOf(Math.max(...changes));
+    if (changes[best] < 0.3) throw new Error("No axis moved enough.");
+    return best;
+  };
+  const steering = moved(samples.left, samples.right);
+  const throttle = moved(samples.throttle, samples.released, [steering]);
+  const brake = moved(samples.brake, samples.free, [steering]);
+  return {
+    steering: { axis: steering, rest: samples.centre[steering], full: samples.left[steering], other: samples.right[steering] },
+    throttle: { axis: throttle, rest: samples.released[throttle], full: samples.throttle[throttle], other: null },
+    brake: { axis: brake, rest: samples.free[brake], full: samples.brake[brake], other: null },
+  };
+}
+
+function say(card, title, text, buttons) {
+  return new Promise((resolve) => {
+    card.replaceChildren();
+    card.hidden = false;
+    card.append(element("h1", title), element("p", text), row(buttons, resolve));
+  });
+}
+
+export function element(tag, text, attributes = {}) {
+  const made = document.createElement(tag);
+  if (text !== undefined) made.textContent = text;
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  return made;
+}
+
+export function row(names, chosen) {
+  const buttons = element("div", undefined, { class: "buttons" });
+  names.forEach((name, i) => {
+    const button = element("button", name, i ? {} : { class: "first" });
+    button.addEventListener("click", () => chosen(name));
+    buttons.append(button);
+    if (!i) setTimeout(() => button.focus({ preventScroll: true }), 0);
+  });
+  return buttons;
+}

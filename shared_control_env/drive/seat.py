@@ -1,0 +1,348 @@
+"""The seat: one drive after another, in real time or in step with a simulated person."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shared_control_env.drive.devices import KEYBOARD, SIMULATED, Axes, Calibration, Keyboard, Simulated
+from shared_control_env.drive.latency import STALE, Line, Timing
+from shared_control_env.drive.protocol import Input
+from shared_control_env.drive.session import Choice, Drive
+from shared_control_env.drive.view import frame_of, road_of
+from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.recordings.trial import SUFFIX, Trial
+
+EMPTY, PREPARING, READY, DRIVING, PAUSED, OVER = "empty", "preparing", "ready", "driving", "paused", "over"
+"""States of the seat."""
+
+MARKER = ".running.json"
+"""File that says which drive is running; one that is found at the start was lost."""
+
+Send = Callable[[dict[str, Any]], None]
+
+
+class Seat:
+    """Prepares, runs, pauses and records drives.
+
+    In real time the ticks have absolute deadlines; a tick that is late is not made up for, and the latest input counts.
+    In step, a tick follows each input that answers the last frame, and the clock is the number of ticks.
+
+    Args:
+        send: sends a message to all pages.
+        in_step: whether the ticks follow the inputs.
+
+    Attributes:
+        state: EMPTY, PREPARING, READY, DRIVING, PAUSED or OVER.
+        drive: the present drive; None without one.
+        shown: what the gauges show.
+        native: reads a device that hangs on this machine, instead of the page's; None without one.
+    """
+
+    def __init__(self, send: Send, in_step: bool = False) -> None:
+        self.send, self.in_step = send, in_step
+        self.state, self.drive = EMPTY, None
+        self.shown: tuple[str, ...] = ()
+        self.native: Any = None
+        self.with_scene = False
+        self._road: dict[str, Any] = {}
+        self._frame: dict[str, Any] = {}
+        self._number = 0
+        self._ticker: asyncio.Task[None] | None = None
+        self._finished: Callable[[Drive], Awaitable[None]] | None = None
+
+    drive: Drive | None
+
+    def clock(self) -> float:
+        """The server's clock [s]: monotonic, or the number of frames in step."""
+        if self.in_step:
+            return self._number * (self.drive.dt if self.drive else 0.0)
+        return time.monotonic()
+
+    async def prepare(
+        self,
+        choice: Choice,
+        device: str,
+        calibration: Calibration | None,
+        shown: tuple[str, ...],
+        finished: Callable[[Drive], Awaitable[None]],
+    ) -> None:
+        """Make a drive ready; what has to be compiled is compiled now, and not while the person drives.
+
+        Args:
+            choice: what is driven.
+            device: kind of device.
+            calibration: its calibration, of a gamepad or wheel.
+            shown: what the gauges show.
+            finished: called when the episode is over.
+
+        Raises:
+            ValueError: if the choice is not possible.
+        """
+        await self.clear()
+        self.state = PREPARING
+        self.send({"type": "state", "state": PREPARING})
+        try:
+            drive = await asyncio.to_thread(_prepared, choice)
+        except BaseException:
+            self.state = EMPTY
+            raise
+        self.drive, self.shown, self._finished = drive, shown, finished
+        self._device: Keyboard | Axes | Simulated = (
+            Keyboard(drive.limits)
+            if device == KEYBOARD
+            else Simulated(drive.limits)
+            if device == SIMULATED
+            else Axes(_given(calibration), drive.limits)
+        )
+        self._readings = np.zeros(self._device.readings)
+        self._line, self._road = Line(), road_of(drive)
+        self.state = READY
+        self.send({"type": "road", **self._road})
+        self._show(self.clock())
+        self.send({"type": "state", "state": READY})
+
+    def play(self, device: Any) -> None:
+        """Drive by a device of this machine, such as a recording, from now on.
+
+        Args:
+            device: has ``read(now)``, ``command(readings, dt)`` and ``push(angle, full)``.
+        """
+        self.native = self._device = device
+        self.begin()
+
+    def present(self) -> list[dict[str, Any]]:
+        """Messages that tell a page that comes later what is going on."""
+        messages = [{"type": "state", "state": self.state}]
+        if self.drive is not None and self._road:
+            messages = [{"type": "road", **self._road}, {"type": "frame", **self._frame}, *messages]
+        return messages
+
+    def begin(self) -> None:
+        """Begin the drive, or go on with it after a pause.
+
+        Raises:
+            ValueError: if nothing is ready.
+        """
+        if self.state not in (READY, PAUSED):
+            raise ValueError(f"there is nothing to begin: the seat is {self.state}")
+        self.state = DRIVING
+        self._line = Line()
+        self.send({"type": "state", "state": DRIVING})
+        if self.in_step:
+            self._show(self.clock())  # the simulated person answers this frame
+        else:
+            self._ticker = asyncio.create_task(self._tick_in_real_time())
+
+    def pause(self, reason: str) -> None:
+        """Pause the drive; its trial is invalid then.
+
+        Args:
+            reason: why.
+        """
+        if self.state != DRIVING or self.drive is None:
+            return
+        self.drive.invalidate(f"{reason} at {len(self.drive)} steps")
+        self.state = PAUSED
+        self.send({"type": "state", "state": PAUSED, "reason": reason})
+
+    async def receive(self, message: Input) -> None:
+        """Take an input of the page.
+
+        Args:
+            message: the readings.
+
+        Raises:
+            ValueError: if the device has more readings than these.
+        """
+        if self.drive is None or self.state not in (READY, DRIVING) or self.native is not None:
+            return
+        if len(message.readings) < self._device.readings:
+            raise ValueError(f"readings: {len(message.readings)} of them; the device has {self._device.readings}")
+        self._readings = np.array(message.readings)
+        now = self.clock()
+        self._line.received(message.stamp, message.echo, message.held, now)
+        if self.in_step and self.state == DRIVING and message.echo == self._number:
+            await self._tick(now, 0.0)
+
+    async def clear(self) -> None:
+        """Leave the drive, whose recording is dropped unless it has been written."""
+        self.state = EMPTY
+        if self._ticker is not None and self._ticker is not asyncio.current_task():
+            self._ticker.cancel()
+            await asyncio.gather(self._ticker, return_exceptions=True)
+        self._ticker = None
+        if self.drive is not None:
+            self.drive.close()
+        self.drive, self._road = None, {}
+
+    async def _tick_in_real_time(self) -> None:
+        """Tick at absolute deadlines until the drive pauses or ends; an error ends the drive, and is told."""
+        try:
+            await self._keep_ticking()
+        except Exception as error:
+            logging.getLogger(__name__).exception("a step failed")
+            self.state = EMPTY
+            self.send({"type": "refused", "message": f"the drive ended by {type(error).__name__}: {error}"})
+            self.send({"type": "state", "state": EMPTY})
+
+    async def _keep_ticking(self) -> None:
+        assert self.drive is not None
+        deadline = self.clock()
+        while self.state == DRIVING:
+            deadline += self.drive.dt
+            await asyncio.sleep(max(0.0, deadline - self.clock()))
+            now = self.clock()
+            if self.state == DRIVING:
+                await self._tick(now, now - deadline)
+            if now - deadline > self.drive.dt:
+                deadline = now  # time that is lost is not made up for
+            if self.drive is None:
+                return
+
+    async def _tick(self, now: float, lateness: float) -> None:
+        drive = self.drive
+        assert drive is not None
+        age = self._line.age(now)
+        if self.native is not None:
+            self._readings, age = self.native.read(now)
+        if not self.in_step and age > STALE:
+            waited = "no input" if np.isinf(age) else f"input {1e3 * age:.0f} ms old"
+            self.pause(f"{waited}, more than {1e3 * STALE:.0f} ms")
+            return
+        command = self._device.command(self._readings, drive.dt)
+        going = drive.step(command, self._readings, Timing(lateness, age, self._line.round_trip))
+        if self.native is not None:
+            self.native.push(float(drive.info["u_a_act"][0, 1]), drive.limits.delta_max)
+        self._show(now, Timing(lateness, age, self._line.round_trip))
+        if not going:
+            self.state = OVER
+            self.send({"type": "state", "state": OVER})
+            assert self._finished is not None
+            task = asyncio.create_task(self._finished(drive))
+            _KEPT.add(task)
+            task.add_done_callback(_KEPT.discard)
+
+    def _show(self, now: float, timing: Timing | None = None) -> None:
+        assert self.drive is not None
+        self._number += 1
+        self._frame = {"n": self._number, **frame_of(self.drive, self.shown)}
+        if timing is not None:
+            times = (1e3 * value for value in timing)
+            self._frame["timing"] = [round(value, 1) if np.isfinite(value) else None for value in times]
+        self._line.sent(self._number, now)
+        message = {"type": "frame", **self._frame}
+        if self.with_scene:
+            message["scene"] = self.drive.env.scene.tobytes().hex()
+            message["observation"] = self.drive.observation.tobytes().hex()
+        self.send(message)
+
+
+_KEPT: set[asyncio.Task[None]] = set()
+"""Tasks that no one else keeps."""
+
+
+def _prepared(choice: Choice) -> Drive:
+    """A drive whose functions are loaded: one step of another one compiles what is missing."""
+    first = Drive(choice)
+    first.step(first.person.command, np.zeros(1), Timing(0.0, 0.0, 0.0))
+    first.close()
+    return Drive(choice)
+
+
+def _given(calibration: Calibration | None) -> Calibration:
+    if calibration is None:
+        raise ValueError("the device needs a calibration")
+    return calibration
+
+
+class RecordingsFolder:
+    """The folder of the recordings: nothing in it is overwritten, and nothing is written elsewhere.
+
+    Args:
+        path: path of the folder, which is made.
+
+    Attributes:
+        path: path of the folder.
+        lost: what was running when the last program ended, in words; empty if nothing was.
+
+    Raises:
+        ValueError: if the folder cannot be written to.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.lost = path, ""
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            marker = path / MARKER
+            if marker.exists():
+                self.lost = _told(marker)
+                marker.unlink()
+            write_atomically(path / ".writable", lambda draft: draft.touch())
+            (path / ".writable").unlink()
+        except OSError as error:
+            raise ValueError(f"{path} cannot be written to: {error.strerror or error}") from None
+
+    def mark(self, what: str) -> None:
+        """Note that a drive begins.
+
+        Args:
+            what: the drive in words.
+        """
+        text = json.dumps({"what": what, "began": time.strftime("%Y-%m-%d %H:%M:%S")})
+        write_atomically(self.path / MARKER, lambda draft: draft.write_text(text, encoding="utf-8"))
+
+    def unmark(self) -> None:
+        """Note that no drive is running."""
+        (self.path / MARKER).unlink(missing_ok=True)
+
+    def add(self, name: str, trial: Trial) -> Path:
+        """Write a recording under a name that is free.
+
+        Args:
+            name: wanted name without suffix; a number follows if it is taken.
+            trial: the recording.
+
+        Returns:
+            Path of the file.
+        """
+        path, i = self.path / f"{name}{SUFFIX}", 1
+        while path.exists():
+            i += 1
+            path = self.path / f"{name}-{i}{SUFFIX}"
+        trial.write(path)
+        return path
+
+    def find(self, name: str) -> Path:
+        """Path of a recording in this folder.
+
+        Args:
+            name: name of the file.
+
+        Raises:
+            ValueError: for a name of anything else.
+        """
+        if Path(name).name != name or not (self.path / name).is_file():
+            raise ValueError(f"{name!r} is no recording in {self.path}")
+        return self.path / name
+
+    def names(self) -> list[str]:
+        """Names of the recordings, the latest first."""
+        found = [path for path in self.path.glob(f"*{SUFFIX}") if not path.name.startswith(".")]
+        return [path.name for path in sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)]
+
+
+def _told(marker: Path) -> str:
+    """What a marker says."""
+    try:
+        content: Mapping[str, Any] = json.loads(marker.read_text(encoding="utf-8"))
+        return f"{content['what']}, begun {content['began']}, was interrupted; its recording is lost"
+    except (OSError, ValueError, KeyError, TypeError):
+        return "a drive was interrupted; its recording is lost"

@@ -17,6 +17,7 @@ try:
 except ImportError:
     sys.exit('shared-control needs the extra "benchmark": pip install "shared_control_env[benchmark]"')
 
+from shared_control_env.core.parameters import IDENTIFIED_DRIVERS
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import combined
@@ -25,6 +26,7 @@ from shared_control_env.evaluation.episodes import AS_GIVEN, MOST_SEEDS, Episode
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import MARGINS, REPORT, TABLE
+from shared_control_env.nearest import hint
 
 app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
 COLUMNS = {
@@ -111,6 +113,10 @@ Names = Annotated[str, typer.Option(help="Names separated by commas, or all.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
 Engine = Annotated[str, typer.Option(help="local, or ray for a Ray cluster.")]
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
+Wheel = Annotated[str, typer.Option(help="Part of the name of a wheel to read without the browser, or any.")]
+Torque = Annotated[float, typer.Option(min=0.0, max=0.3, help="Force feedback, share of the wheel's torque (Linux).")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 for any.")]
+Browser = Annotated[bool, typer.Option(help="Open the page in a browser.")]
 Fresh = Annotated[bool, typer.Option(help="Remove the results that the folder holds, and begin again.")]
 
 
@@ -291,10 +297,11 @@ def drive(
     degradation: Annotated[str, typer.Option(help="Degradation; own; or kind:channel:size:duration.")] = "bias_ramp",
     authority: Annotated[str, typer.Option(help="Authority.")] = "proportional",
     seed: Annotated[int, typer.Option(min=0, help="Seed.")] = 0,
-    wheel: Annotated[str, typer.Option(help="Part of the name of a wheel to read natively, or any.")] = "",
+    wheel: Wheel = "",
+    torque: Torque = 0.0,
     out: Annotated[Path, typer.Option(help="Folder of the recordings.")] = Path("results/drives"),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port on this machine; 0 for any.")] = 8642,
-    browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
+    port: Port = 8642,
+    browser: Browser = True,
 ) -> None:
     """Take the wheel: serves a page on this machine on which you drive, by keyboard, gamepad or wheel."""
     with _needs("drive"):
@@ -304,7 +311,116 @@ def drive(
     console = Console()
     with _in_words(console):
         choice = Choice(scenario, degradation, authority, "", seed)
-        run.drive(choice, out.expanduser(), port, browser, wheel, console)
+        _refuse({"--torque": torque != 0.0 and not wheel}, "without --wheel")
+        run.drive(choice, out.expanduser(), port, browser, wheel, torque, console)
+
+
+@app.command()
+def study(
+    plan: Annotated[Path, typer.Argument(help="Plan of the study, a TOML file.")],
+    code: Annotated[str, typer.Option(help="Code of the person; the next free one by default.")] = "",
+    simulate: Annotated[str, typer.Option(help="Drivers of the catalogue who take part as simulated people.")] = "",
+    people: Annotated[int, typer.Option(min=1, max=10_000, help="Number of simulated people.")] = 1,
+    remnant: Annotated[float, typer.Option(min=0.0, max=0.5, help="Noise of their steering [rad].")] = 0.0,
+    wheel: Wheel = "",
+    torque: Torque = 0.0,
+    out: Annotated[Path | None, typer.Option(help="Folder of the study; results/study/NAME OF THE PLAN.")] = None,
+    port: Port = 8642,
+    browser: Browser = True,
+) -> None:
+    """Run an experiment with people; stopped at any moment, it goes on with the next trial."""
+    with _needs("drive"):
+        from shared_control_env.drive.simulated import Remnant
+        from shared_control_env.drive.study.plan import read_plan
+        from shared_control_env.drive.study.run import with_person, with_simulated
+
+    console = Console()
+    with _in_words(console):
+        checked = read_plan(plan.expanduser())
+        folder = (out or Path("results/study") / plan.stem).expanduser()
+        if simulate:
+            person = {
+                "--code": bool(code),
+                "--no-browser": not browser,
+                "--wheel": bool(wheel),
+                "--torque": torque != 0.0,
+            }
+            _refuse(person, "with --simulate")
+            with_simulated(checked, folder, _names(simulate), people, Remnant(steering=remnant), console)
+        else:
+            _refuse({"--people": people != 1, "--remnant": remnant != 0.0}, "without --simulate")
+            _refuse({"--torque": torque != 0.0 and not wheel}, "without --wheel")
+            with_person(checked, folder, code, port, browser, wheel, torque, console)
+
+
+@app.command()
+def identify(
+    place: Annotated[
+        Path, typer.Argument(help="Folder of recordings, such as that of a study; or a CAN record, .npz.")
+    ],
+    channel: Annotated[str, typer.Option(help="steering or acceleration.")] = "steering",
+    condition: Annotated[str, typer.Option(help="Condition of a study; all but practice by default.")] = "",
+    out: Annotated[Path, typer.Option(help="Folder of table and report.")] = Path("results/identification"),
+) -> None:
+    """Identify K_h and T_h of the people in recordings, beside the paper's Table IV."""
+    from shared_control_env.evaluation.progress import progress_bar
+    from shared_control_env.identification.data import CHANNELS
+    from shared_control_env.identification.people import REPORT
+    from shared_control_env.identification.people import identify as run_identification
+
+    console = Console()
+    with _in_words(console):
+        if place.suffix == ".npz":
+            _print_can(place.expanduser(), console)
+            return
+        if channel not in CHANNELS:
+            raise ValueError(f"channel = {channel!r}; {hint(channel, CHANNELS)}")
+        with progress_bar(console) as bar:
+            task = bar.add_task("people", total=None)
+
+            def tell(done: int, total: int) -> None:
+                bar.update(task, completed=done, total=total)
+
+            table, refused = run_identification(place.expanduser(), out.expanduser(), channel, condition, tell)
+    printed = Table(title="Arm of Eq. 16, and 95 % intervals", pad_edge=False)
+    for name in ("person", "method", "K_h [-]", "T_h [s]", "fit [%]"):
+        printed.add_column(name, justify="left" if name in ("person", "method") else "right")
+    for row in table.to_dict("records"):
+        values = [f"{row[n]:.3f} ({row[f'{n}_low']:.3f} to {row[f'{n}_high']:.3f})" for n in ("K_h", "T_h")]
+        fitted = f"{row['fit']:.1f}" if row["fit"] == row["fit"] else ""
+        values = values if row["found"] else ["no result", ""]
+        if "delay" in row["method"]:
+            continue  # in the report
+        printed.add_row(escape(f"{row['person']}"), row["method"], *values, fitted)
+    for name, lag in IDENTIFIED_DRIVERS.items():
+        printed.add_row(f"paper, {name.replace('_', ' ')}", "Table IV", f"{lag.K_h:.2f}", f"{lag.T_h:.2f}", "")
+    console.print(printed)
+    for line in refused:
+        console.print(f"Refused: {line}", markup=False, soft_wrap=True)
+    console.print(f"The report is {out / REPORT}.", markup=False)
+
+
+def _print_can(path: Path, console: Console) -> None:
+    """Print what a CAN record tells, and what it does not."""
+    from shared_control_env.identification.can import TOUCHED, WORDS, read_record, study
+
+    found = study(read_record(path))
+    console.print(
+        f"{found.duration:.0f} s, of which the automation steers {100 * found.engaged:.0f} % "
+        f"({found.by_hand:.1f} s by hand).\nCommand to motor torque: delay {1e3 * found.delay:.0f} ms, correlation "
+        f"{found.correlation:.2f}.\nWhile it steers, the driver's torque is at most {found.torque:.0f} counts; it is a "
+        f"push, of more than {TOUCHED:.0f} counts, in {100 * found.pushing:.1f} % of the time"
+        + (f", and against the motor in {100 * found.conflict:.0f} % of that." if found.pushing else "."),
+        markup=False,
+    )
+    console.print(WORDS, markup=False)
+
+
+def _refuse(given: dict[str, bool], when: str) -> None:
+    """Raise BadParameter for the first option that is given but would not act."""
+    for option, is_given in given.items():
+        if is_given:
+            raise typer.BadParameter(f"{option} would not act {when}")
 
 
 @contextmanager

@@ -128,10 +128,8 @@ class FreeDriving:
 
         async def finished(drive: Drive) -> None:
             self._result = {"type": "replayed", "name": name, "same": playback.same(drive), "versions": versions()}
-            self.seat.native = native
             self.seat.send(self._result)
 
-        native = self.seat.native
         await self.seat.prepare(Choice(**trial.header["choice"]), "simulated", None, SHOWN, finished)
         self.seat.play(playback)
 
@@ -168,12 +166,15 @@ class Playback:
         """
         return Command(*readings.tolist())
 
-    def push(self, angle: float, full: float) -> None:
+    def push(self, automation: float, full: float, calibration: Any) -> None:
         """Nothing to push.
 
         Args:
-            angle, full: not used.
+            automation, full, calibration: not used.
         """
+
+    def rest(self) -> None:
+        """Nothing to let go of."""
 
     def same(self, drive: Drive) -> bool:
         """Whether the drive went as recorded, to the bit.

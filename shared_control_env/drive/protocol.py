@@ -72,6 +72,16 @@ class Replay(Message):
     name: Name
 
 
+class Sample(Message):
+    """Readings at a step of the calibration; none for a wheel that the server reads itself."""
+
+    type: Literal["sample"]
+    step: Literal["left", "right", "centre", "throttle", "released", "brake", "free"]
+    device: Literal["gamepad", "wheel"]
+    name: Name
+    readings: Annotated[list[Reading], MaxLen(MOST_AXES)] = []
+
+
 class Consent(Message):
     """The person agrees to take part, or does not."""
 
@@ -95,7 +105,9 @@ class Answers(Message):
 
 
 _ANY: TypeAdapter[Any] = TypeAdapter(
-    Annotated[Input | Start | Simple | Pause | Replay | Consent | Device | Answers, Field(discriminator="type")]
+    Annotated[
+        Input | Start | Simple | Pause | Sample | Replay | Consent | Device | Answers, Field(discriminator="type")
+    ]
 )
 
 

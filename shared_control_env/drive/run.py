@@ -7,13 +7,14 @@ from pathlib import Path
 from rich.console import Console
 
 from shared_control_env.drive.free import FreeDriving
+from shared_control_env.drive.native import open_wheel
 from shared_control_env.drive.seat import RecordingsFolder
-from shared_control_env.drive.server import PORT, Server
+from shared_control_env.drive.server import Server
 from shared_control_env.drive.session import BESIDE, Choice
 from shared_control_env.evaluation.catalogue import DRIVERS
 
 
-def drive(choice: Choice, out: Path, port: int, browser: bool, wheel: str, console: Console) -> None:
+def drive(choice: Choice, out: Path, port: int, browser: bool, wheel: str, torque: float, console: Console) -> None:
     """Serve the page on which a person drives freely, until interrupted.
 
     Args:
@@ -22,6 +23,7 @@ def drive(choice: Choice, out: Path, port: int, browser: bool, wheel: str, conso
         port: port that is tried first.
         browser: whether to open the page.
         wheel: name, or a part of it, of a wheel on this machine that is read natively; empty for the page's devices.
+        torque: largest torque of its force feedback, as a share of the device's; 0 for none.
         console: prints.
 
     Raises:
@@ -31,7 +33,9 @@ def drive(choice: Choice, out: Path, port: int, browser: bool, wheel: str, conso
     folder = RecordingsFolder(out)
     if folder.lost:
         console.print(f"Note: {folder.lost}.", markup=False)
+    native = open_wheel(wheel, torque) if wheel else None
     server = Server(lambda seat: FreeDriving(seat, folder, choice), port=port)
+    server.seat.native = native
     announce(server, port, console)
     console.print(f"Recordings go to {out}. Ctrl+C ends.", markup=False)
     server.run(browser)
@@ -53,6 +57,3 @@ def announce(server: Server, port: int, console: Console) -> None:
             f"Note: port {port} is taken; this is {server.port}, where the page does not know earlier calibrations."
         )
     console.print(f"The page is {server.url}", markup=False, soft_wrap=True)
-
-
-__all__ = ["PORT", "announce", "drive"]

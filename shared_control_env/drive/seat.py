@@ -6,15 +6,17 @@ import asyncio
 import json
 import logging
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
+from math import nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shared_control_env.drive.devices import KEYBOARD, SIMULATED, Axes, Calibration, Keyboard, Simulated
+from shared_control_env.drive.calibration import STEPS, calibrated
+from shared_control_env.drive.devices import KEYBOARD, SIMULATED, WHEEL, Axes, Calibration, Keyboard, Simulated
 from shared_control_env.drive.latency import STALE, Line, Timing
-from shared_control_env.drive.protocol import Input
+from shared_control_env.drive.protocol import Input, Sample
 from shared_control_env.drive.session import Choice, Drive
 from shared_control_env.drive.view import frame_of, road_of
 from shared_control_env.evaluation.storage import write_atomically
@@ -44,6 +46,7 @@ class Seat:
         drive: the present drive; None without one.
         shown: what the gauges show.
         native: reads a device that hangs on this machine, instead of the page's; None without one.
+        with_scene: whether frames carry the scene record, which simulated people see.
     """
 
     def __init__(self, send: Send, in_step: bool = False) -> None:
@@ -55,8 +58,10 @@ class Seat:
         self._road: dict[str, Any] = {}
         self._frame: dict[str, Any] = {}
         self._number = 0
+        self._samples: dict[str, list[float]] = {}
+        self._source: Any = None
         self._ticker: asyncio.Task[None] | None = None
-        self._finished: Callable[[Drive], Awaitable[None]] | None = None
+        self._finished: Callable[[Drive], Coroutine[Any, Any, None]] | None = None
 
     drive: Drive | None
 
@@ -72,7 +77,7 @@ class Seat:
         device: str,
         calibration: Calibration | None,
         shown: tuple[str, ...],
-        finished: Callable[[Drive], Awaitable[None]],
+        finished: Callable[[Drive], Coroutine[Any, Any, None]],
     ) -> None:
         """Make a drive ready; what has to be compiled is compiled now, and not while the person drives.
 
@@ -102,10 +107,12 @@ class Seat:
             if device == SIMULATED
             else Axes(_given(calibration), drive.limits)
         )
-        self._readings = np.zeros(self._device.readings)
+        self._source = self.native if device == WHEEL else None  # two devices never mix
+        self._calibration, self._readings = calibration, np.zeros(self._device.readings)
         self._line, self._road = Line(), road_of(drive)
         self.state = READY
-        self.send({"type": "road", **self._road})
+        chosen = {"choice": choice._asdict()} if self.with_scene else {}
+        self.send({"type": "road", **self._road, **chosen})
         self._show(self.clock())
         self.send({"type": "state", "state": READY})
 
@@ -115,7 +122,7 @@ class Seat:
         Args:
             device: has ``read(now)``, ``command(readings, dt)`` and ``push(angle, full)``.
         """
-        self.native = self._device = device
+        self._source = self._device = device
         self.begin()
 
     def present(self) -> list[dict[str, Any]]:
@@ -151,6 +158,7 @@ class Seat:
             return
         self.drive.invalidate(f"{reason} at {len(self.drive)} steps")
         self.state = PAUSED
+        self._rest()
         self.send({"type": "state", "state": PAUSED, "reason": reason})
 
     async def receive(self, message: Input) -> None:
@@ -162,7 +170,7 @@ class Seat:
         Raises:
             ValueError: if the device has more readings than these.
         """
-        if self.drive is None or self.state not in (READY, DRIVING) or self.native is not None:
+        if self.drive is None or self.state not in (READY, DRIVING) or self._source is not None:
             return
         if len(message.readings) < self._device.readings:
             raise ValueError(f"readings: {len(message.readings)} of them; the device has {self._device.readings}")
@@ -171,6 +179,23 @@ class Seat:
         self._line.received(message.stamp, message.echo, message.held, now)
         if self.in_step and self.state == DRIVING and message.echo == self._number:
             await self._tick(now, 0.0)
+
+    def sample(self, message: Sample) -> None:
+        """Take the readings of a step of the calibration; after the last step the calibration is sent.
+
+        Args:
+            message: the step and its readings.
+
+        Raises:
+            ValueError: if no calibration can be told from the steps.
+        """
+        if message.step == next(iter(STEPS)):
+            self._samples = {}
+        native = self.native is not None and not message.readings
+        self._samples[message.step] = self.native.read(self.clock())[0].tolist() if native else message.readings
+        if message.step == list(STEPS)[-1]:
+            made = calibrated(message.device, self.native.name if native else message.name, self._samples)
+            self.send({"type": "calibration", "calibration": made.model_dump()})
 
     async def clear(self) -> None:
         """Leave the drive, whose recording is dropped unless it has been written."""
@@ -182,6 +207,11 @@ class Seat:
         if self.drive is not None:
             self.drive.close()
         self.drive, self._road = None, {}
+
+    def _rest(self) -> None:
+        """Let go of a wheel with forces."""
+        if self._source is not None:
+            self._source.rest()
 
     async def _tick_in_real_time(self) -> None:
         """Tick at absolute deadlines until the drive pauses or ends; an error ends the drive, and is told."""
@@ -211,19 +241,23 @@ class Seat:
         drive = self.drive
         assert drive is not None
         age = self._line.age(now)
-        if self.native is not None:
-            self._readings, age = self.native.read(now)
-        if not self.in_step and age > STALE:
+        if self._source is not None:
+            self._readings, age = self._source.read(now)
+        timing = Timing(lateness, age, self._line.round_trip)
+        if self.in_step:
+            timing = Timing(0.0, 0.0, nan)  # nothing waits for anything
+        elif age > STALE:
             waited = "no input" if np.isinf(age) else f"input {1e3 * age:.0f} ms old"
             self.pause(f"{waited}, more than {1e3 * STALE:.0f} ms")
             return
         command = self._device.command(self._readings, drive.dt)
-        going = drive.step(command, self._readings, Timing(lateness, age, self._line.round_trip))
-        if self.native is not None:
-            self.native.push(float(drive.info["u_a_act"][0, 1]), drive.limits.delta_max)
-        self._show(now, Timing(lateness, age, self._line.round_trip))
+        going = drive.step(command, self._readings, timing)
+        if self._source is not None:
+            self._source.push(float(drive.info["u_a_act"][0, 1]), drive.limits.delta_max, self._calibration)
+        self._show(now, timing)
         if not going:
             self.state = OVER
+            self._rest()
             self.send({"type": "state", "state": OVER})
             assert self._finished is not None
             task = asyncio.create_task(self._finished(drive))
@@ -242,6 +276,7 @@ class Seat:
         if self.with_scene:
             message["scene"] = self.drive.env.scene.tobytes().hex()
             message["observation"] = self.drive.observation.tobytes().hex()
+            message["driving"] = self.state == DRIVING
         self.send(message)
 
 

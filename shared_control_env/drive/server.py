@@ -12,7 +12,7 @@ import threading
 import time
 import webbrowser
 from collections import deque
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Coroutine
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -25,7 +25,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from shared_control_env.drive.protocol import LARGEST, Input, Message, Pause, parse
+from shared_control_env.drive.protocol import LARGEST, Input, Message, Pause, Sample, parse
 from shared_control_env.drive.seat import Seat
 
 HOST = "127.0.0.1"
@@ -165,19 +165,37 @@ class Server:
             )
         )
 
-    def run(self, browser: bool = False) -> None:
+    def run(self, browser: bool = False, until: Coroutine[Any, Any, None] | None = None) -> None:
         """Serve until interrupted.
 
         Args:
             browser: whether to open the page in a browser.
+            until: ends the serving when it ends; None to go on.
         """
+
+        async def both() -> None:
+            ending = asyncio.create_task(self._stop_after(until)) if until is not None else None
+            await self.serve()
+            if ending is not None:
+                ending.cancel()
+
         if browser:
             threading.Timer(0.5, webbrowser.open, [self.url]).start()
-        self._uvicorn.run(sockets=[self._socket])
+        with contextlib.suppress(KeyboardInterrupt):
+            asyncio.run(both())
+
+    async def _stop_after(self, until: Coroutine[Any, Any, None]) -> None:
+        await until
+        self.stop()
 
     async def serve(self) -> None:
         """Serve within a running event loop, until :meth:`stop`."""
         await self._uvicorn.serve(sockets=[self._socket])
+
+    async def started(self) -> None:
+        """Wait until pages can connect."""
+        while not self._uvicorn.started:
+            await asyncio.sleep(0.005)
 
     def stop(self) -> None:
         """End :meth:`run` or :meth:`serve`."""
@@ -272,6 +290,8 @@ class Server:
                         await self.seat.receive(message)
                     elif isinstance(message, Pause):
                         self.seat.pause(message.words)
+                    elif isinstance(message, Sample):
+                        self.seat.sample(message)
                     else:
                         self._work(page, message)
                 except ValueError as error:

@@ -26,8 +26,8 @@ TAKEN = {DRIVER: (2,), AUTHORITY: (1, 2)}
 """How many numbers each slot takes."""
 
 NOT_DIRECT = (
-    "config['driver_lag']['direct'] = True does not go with the predictive driver, which decides on u_h,des; it needs an "
-    "open driver's slot, or a driver of your own that gives u_h,act"
+    "config['driver_lag']['direct'] = True does not go with the predictive driver, which decides on u_h,des; it needs "
+    "an open driver's slot, or a driver of your own that gives u_h,act"
 )
 """Error message for a direct driver's slot that the predictive driver fills."""
 

@@ -382,8 +382,8 @@ class SharedControlVectorEnv(VectorEnv):
         return None if self.render_mode == "human" else tuple(frames)
 
     def _check_driver(self, present: Sequence[Settings]) -> None:
-        """Raise ValueError if any of the settings has a person but the driver's slot is open, or is direct but bound."""
-        if self._driver and any(settings.driver_lag.direct for settings in present):
+        """Raise ValueError for a person beside an open driver's slot, or a direct slot that is bound."""
+        if self._driver and any(settings.is_direct for settings in present):
             raise ValueError(NOT_DIRECT)
         if not self._driver and any(settings.has_person for settings in present):
             raise ValueError("the person in config['person'] or config['persons'] would not act: it needs driver=True")

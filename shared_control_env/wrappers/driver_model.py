@@ -76,7 +76,7 @@ class DriverModel(SlotWrapper, RecordConstructorArgs):
 
     def _check_driver(self) -> None:
         """Raise ValueError if the settings have a person but a driver was given, or are direct but none was."""
-        if self._given is None and self.shared.settings.driver_lag.direct:
+        if self._given is None and self.shared.settings.is_direct:
             raise ValueError(NOT_DIRECT)
         if self._given is not None and self.shared.settings.has_person:
             raise ValueError(

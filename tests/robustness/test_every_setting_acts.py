@@ -141,8 +141,11 @@ VALUES = {
     "internal_model.T_h": 0.3,
 }
 # Refused beside these settings, by name; what is told is checked too.
-REFUSED = {"other_vehicles_type": "knows no plans", "neighbour_vehicles_connected_lanes": "would not act",
-    "driver_lag.direct": "a direct driver has an arm"}
+REFUSED = {
+    "other_vehicles_type": "knows no plans",
+    "neighbour_vehicles_connected_lanes": "would not act",
+    "driver_lag.direct": "a direct driver has an arm",
+}
 # Acts on the clock or on a window alone.
 NOT_SEEN = {"real_time_rendering", "offscreen_rendering"}
 

@@ -46,11 +46,24 @@ function receive(message) {
     result: () => result(message),
     replayed: () => replayed(message),
     recordings: () => recordings(message.names),
-    step: () => { state = message.step; buttons(); hint.hidden = true; get("what").textContent = message.title; step(card, message, send, input, calibrate); },
-    refused: () => { show("notice", message.message); if (state === "preparing") change("empty"); },
+    step: () => { state = message.step; buttons(); hint.hidden = true; get("what").textContent = message.title; step(card, message, send, input, (device) => calibrate(card, device, nativeFor(device), ask), nativeFor); },
+    calibration: () => answer(message),
+    refused: () => { if (awaited) { answer(message); return; } show("notice", message.message); if (state === "preparing") change("empty"); },
   };
   kinds[message.type]?.();
 }
+
+// Sends a message; the promise is of the reply, where one is expected.
+let awaited = null;
+function ask(message, last) {
+  send(message);
+  return last ? new Promise((resolve) => { awaited = resolve; }) : null;
+}
+function answer(message) {
+  awaited?.(message);
+  awaited = null;
+}
+const nativeFor = (device) => (device === "wheel" ? welcome.native : "");
 
 const show = (id, text) => { get(id).textContent = text; };
 
@@ -118,22 +131,22 @@ function choose() {
   const device = element("select", undefined, { id: "device" });
   for (const name of ["keyboard", "gamepad", "wheel"]) device.append(element("option", name));
   device.value = chosen.device;
-  const about = element("small", welcome.native || "");
+  const about = element("small", welcome.native ? `wheel: ${welcome.native}, read by the server` : "");
   device.addEventListener("change", () => { chosen.device = device.value; });
   form.append(element("label", "seed", { for: "seed" }), seed, element("small", "the same seed gives the same episode"), element("label", "device", { for: "device" }), device, about);
   card.append(form, row(["Drive", "Calibrate", "Recordings"], (name) => ({ Drive: start, Calibrate: () => calibration(), Recordings: () => send({ type: "recordings" }) })[name]()));
 }
 
 async function start() {
-  input.choose(chosen.device);
-  if (chosen.device !== "keyboard" && !welcome.native && !input.calibration && !(await calibration())) return;
+  input.choose(chosen.device, nativeFor(chosen.device));
+  if (chosen.device !== "keyboard" && !input.calibration && !(await calibration())) return;
   send({ type: "start", ...chosen, calibration: input.calibration });
 }
 
 async function calibration() {
   if (chosen.device === "keyboard") { show("notice", "The keyboard needs no calibration."); return false; }
-  input.choose(chosen.device);
-  const made = await calibrate(card, chosen.device);
+  input.choose(chosen.device, nativeFor(chosen.device));
+  const made = await calibrate(card, chosen.device, nativeFor(chosen.device), ask);
   if (made) input.keep(made);
   choose();
   return Boolean(made);

@@ -27,12 +27,12 @@ export class Input {
     return pad ? axesOf(pad) : null;
   }
 
-  choose(device) {
+  choose(device, native) {
     this.device = device;
     this.calibration = null;
-    const pad = connected();
-    if (device !== "keyboard" && pad) {
-      const kept = localStorage.getItem(STORE + device + pad.id);
+    const name = native || connected()?.id.slice(0, 150);
+    if (device !== "keyboard" && name) {
+      const kept = localStorage.getItem(STORE + device + name);
       if (kept) this.calibration = JSON.parse(kept);
     }
   }
@@ -58,42 +58,24 @@ const STEPS = [
   ["free", "Release it."],
 ];
 
-// Asks for movements one after the other and finds the axes that moved. Ends with a calibration, or null.
-export async function calibrate(card, device) {
-  const samples = {};
-  const pad = connected();
-  if (!pad) {
+// Asks for movements one after the other. Ends with a calibration, or null.
+// The server finds the axes, and reads a wheel that hangs on its machine (native) itself.
+export async function calibrate(card, device, native, ask) {
+  const pad = native ? null : connected(), name = native || (pad && pad.id.slice(0, 150));
+  if (!name) {
     await say(card, "No gamepad or wheel is found", "Connect it and press one of its buttons: browsers show it only then.", ["Back"]);
     return null;
   }
-  for (const [name, text] of STEPS) {
-    if ((await say(card, `Calibration of ${pad.id}`, text, ["Next", "Cancel"])) === "Cancel") return null;
-    samples[name] = axesOf(connected() || pad);
+  let reply = null;
+  for (const [step, text] of STEPS) {
+    if ((await say(card, `Calibration of ${name}`, text, ["Next", "Cancel"])) === "Cancel") return null;
+    const last = step === STEPS.at(-1)[0];
+    reply = ask({ type: "sample", step, device, name, readings: native ? [] : axesOf(connected() || pad) }, last);
   }
-  try {
-    return { device, name: pad.id.slice(0, 150), dead_zone: device === "gamepad" ? 0.08 : 0, ...found(samples) };
-  } catch (error) {
-    await say(card, "That did not work", `${error.message} Try again.`, ["Back"]);
-    return null;
-  }
-}
-
-// The axes of steering and pedals, from the readings at each step.
-export function found(samples) {
-  const moved = (a, b, but = []) => {
-    const changes = a.map((value, i) => (but.includes(i) ? 0 : Math.abs(value - b[i])));
-    const best = changes.indexOf(Math.max(...changes));
-    if (changes[best] < 0.3) throw new Error("No axis moved enough.");
-    return best;
-  };
-  const steering = moved(samples.left, samples.right);
-  const throttle = moved(samples.throttle, samples.released, [steering]);
-  const brake = moved(samples.brake, samples.free, [steering]);
-  return {
-    steering: { axis: steering, rest: samples.centre[steering], full: samples.left[steering], other: samples.right[steering] },
-    throttle: { axis: throttle, rest: samples.released[throttle], full: samples.throttle[throttle], other: null },
-    brake: { axis: brake, rest: samples.free[brake], full: samples.brake[brake], other: null },
-  };
+  reply = await reply;
+  if (reply.calibration) return reply.calibration;
+  await say(card, "That did not work", reply.message, ["Back"]);
+  return null;
 }
 
 function say(card, title, text, buttons) {

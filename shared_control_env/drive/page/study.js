@@ -2,13 +2,13 @@
 
 import { element, row } from "./input.js";
 
-export function step(card, message, send, input, calibrate) {
+export function step(card, message, send, input, calibrate, nativeFor) {
   card.hidden = false;
   card.replaceChildren(element("h1", message.title));
   for (const paragraph of (message.text || "").split("\n\n")) card.append(element("p", paragraph));
   const steps = {
     consent: () => card.append(row(["I agree", "I do not take part"], (name) => send({ type: "consent", agreed: name === "I agree" }))),
-    device: () => card.append(row(message.devices, (name) => device(card, name, send, input, calibrate))),
+    device: () => card.append(row(message.devices, (name) => device(name, send, input, calibrate, nativeFor))),
     next: () => card.append(row([message.button], () => send({ type: "begin" }))),
     questionnaire: () => questionnaire(card, message, send),
     end: () => {},
@@ -16,10 +16,10 @@ export function step(card, message, send, input, calibrate) {
   steps[message.step]();
 }
 
-async function device(card, name, send, input, calibrate) {
-  input.choose(name);
+async function device(name, send, input, calibrate, nativeFor) {
+  input.choose(name, nativeFor(name));
   if (name !== "keyboard" && !input.calibration) {
-    const made = await calibrate(card, name);
+    const made = await calibrate(name);
     if (!made) { send({ type: "begin" }); return; }
     input.keep(made);
   }

@@ -319,6 +319,11 @@ class Settings(Section):
         return round(self.duration * self.policy_frequency)
 
     @property
+    def is_direct(self) -> bool:
+        """Whether the driver's slot takes u_h,act itself."""
+        return bool(self.driver_lag.direct)
+
+    @property
     def has_person(self) -> bool:
         """Whether the predictive driver is the model of a person."""
         return self.person.active or bool(self.persons)

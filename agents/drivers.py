@@ -8,12 +8,15 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from shared_control_env.controllers.allocators import Allocator
 from shared_control_env.controllers.driver import Driver
 from shared_control_env.controllers.recorded import RecordedDriver
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
 from shared_control_env.learned.policy import LearnedAllocator, LearnedDriver, Policy
 from shared_control_env.learned.shipped import shipped
+from shared_control_env.recordings.trial import Trial
 
 T = TypeVar("T")
 
@@ -33,11 +36,22 @@ def _recording(path: Path) -> Callable[[], Driver]:
     return partial(RecordedDriver, RecordedDriver.read(path))
 
 
+def _drive(path: Path) -> Callable[[], Driver]:
+    """A person's drive: u_h,act over time, for a slot that is direct."""
+    trial = Trial.read(path)
+    return partial(RecordedDriver, np.column_stack([trial.columns["t"], trial.columns["command"]]))
+
+
 def _allocator(path: Path) -> Callable[[], Allocator]:
     return partial(LearnedAllocator, Policy.load(path))
 
 
-READERS: dict[str, Callable[[Path], Callable[[], Driver]]] = {".npz": _policy, ".zip": _model, ".csv": _recording}
+READERS: dict[str, Callable[[Path], Callable[[], Driver]]] = {
+    ".npz": _policy,
+    ".zip": _model,
+    ".csv": _recording,
+    ".parquet": _drive,
+}
 """Reader of a driver for each file extension."""
 
 
@@ -64,7 +78,7 @@ def driver_entry(source: str, trusted: bool = False) -> DriverEntry:
     Args:
         source: a name in the benchmark's catalogue, such as ``mpc``; the name of a policy that ships with the package,
             such as ``driver-0``; or a file: a policy (``.npz``), a model of Stable-Baselines3 (``.zip``), or a
-            recording (``.csv``).
+            recording of commands (``.csv``) or of a person's drive (``.parquet``).
         trusted: whether a model may be read. A model holds pickled code, which can do anything as it is read. The
             other files hold only numbers.
 
@@ -80,7 +94,9 @@ def driver_entry(source: str, trusted: bool = False) -> DriverEntry:
         )
     if path.suffix in READERS:
         make = _read("driver", path, READERS[path.suffix])
-        return DriverEntry(f"of {path.name}", make, fingerprint=_digest(path) if path.suffix == ".zip" else None)
+        config = {"driver_lag": {"direct": True}} if path.suffix == ".parquet" else {}
+        mark = _digest(path) if path.suffix == ".zip" else None
+        return DriverEntry(f"of {path.name}", make, config, fingerprint=mark)
     known: dict[str, Any] = {**DRIVERS, **dict.fromkeys(shipped("driver"))}
     return choose_one("driver", source, known)
 

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import settings
 
 from shared_control_env.evaluation.additions import additions
+from tests.browser import browser  # noqa: F401
 
 settings.register_profile("repeatable", deadline=None, derandomize=True)
 settings.load_profile("repeatable")

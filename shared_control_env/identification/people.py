@@ -4,36 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from shared_control_env.identification.data import Drives, read_people
-from shared_control_env.identification.diagnostics import Diagnostics, diagnose
-from shared_control_env.identification.estimate import Estimate, box_jenkins, instrumental
+from shared_control_env.identification.data import read_people
+from shared_control_env.identification.person import Person, identify_person
 from shared_control_env.identification.report import write_report
 
 TABLE, REPORT = "drivers.csv", "report.html"
 """Files of an identification."""
-
-
-class Person(NamedTuple):
-    """What was identified of a person.
-
-    Attributes:
-        drives: the drives.
-        estimate: output error with AR(1) remnant, without a delay.
-        delayed: the same with a delay.
-        cross_check: instrumental variables.
-        diagnostics: quality of the estimate.
-    """
-
-    drives: Drives
-    estimate: Estimate
-    delayed: Estimate
-    cross_check: Estimate
-    diagnostics: Diagnostics
 
 
 def identify(
@@ -65,10 +45,7 @@ def identify(
     for i, (code, drives) in enumerate(everyone.items()):
         if progress is not None:
             progress(i, len(everyone))
-        estimate = box_jenkins(drives)
-        people[code] = Person(
-            drives, estimate, box_jenkins(drives, delay=True), instrumental(drives), diagnose(drives, estimate)
-        )
+        people[code] = identify_person(drives)
     if progress is not None:
         progress(len(everyone), len(everyone))
     table = table_of(people)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
@@ -19,9 +18,7 @@ from shared_control_env.evaluation.storage import write_atomically
 from shared_control_env.identification.diagnostics import LAGS
 from shared_control_env.identification.estimate import innovations
 from shared_control_env.identification.model import respond
-
-if TYPE_CHECKING:
-    from shared_control_env.identification.people import Person
+from shared_control_env.identification.person import Person
 
 PAPERS_FIT = {
     "driver_1": 83.14,

@@ -15,6 +15,9 @@ LAYERS = [
     ("shared_control_env.envs",),
     ("shared_control_env.wrappers", "shared_control_env.vector"),
     ("shared_control_env.learned", "shared_control_env.evaluation"),
+    ("shared_control_env.recordings",),
+    ("shared_control_env.drive",),
+    ("shared_control_env.identification",),
     ("agents",),
     ("experiments",),
 ]

@@ -1,4 +1,4 @@
-"""A browser for the tests of reports."""
+"""A browser for the tests of pages."""
 
 import shutil
 

@@ -146,6 +146,8 @@ class Seat:
         if self.in_step:
             self._show(self.clock())  # the simulated person answers this frame
         else:
+            if self._ticker is not None:
+                self._ticker.cancel()  # one that has not noticed a short pause yet
             self._ticker = asyncio.create_task(self._tick_in_real_time())
 
     def pause(self, reason: str) -> None:

@@ -16,7 +16,7 @@ from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.drive.devices import Command
 from shared_control_env.drive.latency import Timing, summary
 from shared_control_env.envs.scenarios import SCENARIOS
-from shared_control_env.envs.settings import parameters_of
+from shared_control_env.envs.settings import combined, parameters_of
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
 from shared_control_env.evaluation.episodes import EpisodeBatch, RunningBatch, fault_named, settings_of, versions
 from shared_control_env.evaluation.metrics import METRICS
@@ -69,7 +69,7 @@ class Choice(NamedTuple):
             raise ValueError(f"seed = {self.seed!r} must be a whole number from 0 to {MOST_SEED}")
         fault = fault_named(self.degradation)
         batch = EpisodeBatch(self.scenario, driver, (self.authority, entry), ((fault, self.seed),), {}, twins=False)
-        settings_of(batch, fault)  # raises if two parts disagree
+        combined(SCENARIOS[self.scenario].settings, settings_of(batch, fault))  # raises for what cannot be
         return batch
 
 

@@ -72,7 +72,7 @@ class Trial:
             metadata={KEY: json.dumps(self.header)},
         )
         table = pa.table(list(arrays.values()), schema=schema)
-        write_atomically(path, lambda draft: pq.write_table(table, draft))
+        write_atomically(path, lambda draft: pq.write_table(table, draft, write_page_checksum=True))
 
     @classmethod
     def read(cls, path: Path) -> Trial:
@@ -85,7 +85,7 @@ class Trial:
             ValueError: if the file is no recording of a drive, or damaged.
         """
         try:
-            table = pq.read_table(path, memory_map=False)
+            table = pq.read_table(path, page_checksum_verification=True)
             metadata = table.schema.metadata or {}
             header = json.loads(metadata[KEY])
             columns = {

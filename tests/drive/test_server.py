@@ -111,6 +111,21 @@ def test_stale_input_pauses_and_marks_the_drive(page, folder):
     assert not Trial.read(folder.path / result["recording"]).header["valid"]
 
 
+def test_a_pause_shorter_than_a_step_does_not_double_the_speed(page):
+    page.start(degradation="none")
+    page.say(type="begin")
+    page.drive(0.3)
+    for _ in range(5):
+        page.say(type="pause")
+        page.until("state", state="paused")
+        page.say(type="resume")
+        page.until("state", state="driving")
+        page.press()
+    first, begin = page.frame["k"], time.monotonic()
+    page.drive(1.0)
+    assert page.frame["k"] - first == pytest.approx(20.0 * (time.monotonic() - begin), abs=3)
+
+
 @pytest.mark.parametrize(
     ("message", "said"), [({"reason": "hidden"}, "the page was hidden"), ({}, "paused by the driver")]
 )

@@ -149,3 +149,26 @@ def test_the_worked_example_runs(tmp_path):
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "curve_at_25/report.html").is_file()
     assert "```text" in text  # the output that the page shows
+
+
+def test_the_page_on_people_at_the_wheel(tmp_path):
+    """Its Python runs; its plan is one; its study and identification run with simulated people."""
+    from shared_control_env.drive.study.plan import read_plan
+
+    text = (ROOT / "docs/at_the_wheel.md").read_text()
+    code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
+    assert subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True).returncode == 0
+    (plan,) = re.findall(r"```toml\n(.*?)```", text, re.S)
+    (tmp_path / "plan.toml").write_text(plan)
+    assert read_plan(tmp_path / "plan.toml").repetitions == 4
+    command = [sys.executable, "-m", "shared_control_env.cli"]
+    for arguments in (
+        "study plan.toml --simulate population --people 2 --remnant 0.005",
+        "identify results/study/plan --condition unlimited",
+    ):
+        result = subprocess.run([*command, *arguments.split()], cwd=tmp_path, capture_output=True, text=True)
+        assert result.returncode == 0, result.stdout + result.stderr
+    assert (tmp_path / "results/identification/report.html").is_file()
+    for command_line in re.findall(r"^    shared-control (.*)$", text, re.M):
+        name = command_line.split()[0]
+        assert subprocess.run([*command, name, "--help"], capture_output=True).returncode == 0

@@ -13,8 +13,9 @@ import numpy as np
 
 from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.drive.devices import Command
+from shared_control_env.drive.folders import RecordingsFolder
 from shared_control_env.drive.protocol import Message, Replay, Simple, Start, check_device
-from shared_control_env.drive.seat import OVER, RecordingsFolder, Seat
+from shared_control_env.drive.seat import OVER, Seat
 from shared_control_env.drive.session import BESIDE, Choice, Drive, result_of_model
 from shared_control_env.drive.view import SHOWN
 from shared_control_env.envs.degradations import DEGRADATIONS

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from shared_control_env.drive.folders import RecordingsFolder, locked
 from shared_control_env.drive.free import FreeDriving
 from shared_control_env.drive.native import open_wheel
-from shared_control_env.drive.seat import RecordingsFolder
 from shared_control_env.drive.server import Server
 from shared_control_env.drive.session import BESIDE, Choice
 from shared_control_env.evaluation.catalogue import DRIVERS
@@ -30,18 +30,17 @@ def drive(choice: Choice, out: Path, port: int, browser: bool, wheel: str, torqu
         ValueError: if the choice is not possible, the folder cannot be written to, or there is no such wheel.
     """
     choice.batch((BESIDE, DRIVERS[BESIDE]))
-    folder = RecordingsFolder(out)
-    if folder.lost:
-        console.print(f"Note: {folder.lost}.", markup=False)
     native = open_wheel(wheel, torque) if wheel else None
-    server = Server(lambda seat: FreeDriving(seat, folder, choice), port=port)
-    server.seat.native = native
-    announce(server, port, console)
-    console.print(f"Recordings go to {out}. Ctrl+C ends.", markup=False)
-    server.run(browser)
-    lost = server.seat.drive is not None and server.seat.drive.going and len(server.seat.drive) > 0
-    folder.unmark()
-    console.print("The drive that was under way is not recorded." if lost else "Ended.", markup=False)
+    with locked(out):
+        folder = RecordingsFolder(out)
+        if folder.lost:
+            console.print(f"Note: {folder.lost}.", markup=False)
+        server = Server(lambda seat: FreeDriving(seat, folder, choice), port=port)
+        server.seat.native = native
+        announce(server, port, console)
+        console.print(f"Recordings go to {out}. Ctrl+C ends.", markup=False)
+        server.run(browser)
+        console.print("The drive that was under way is lost." if folder.unmark() else "Ended.", markup=False)
 
 
 def announce(server: Server, port: int, console: Console) -> None:

@@ -8,8 +8,8 @@ import time
 import pytest
 from websockets.sync.client import connect
 
+from shared_control_env.drive.folders import RecordingsFolder
 from shared_control_env.drive.free import FreeDriving
-from shared_control_env.drive.seat import RecordingsFolder
 from shared_control_env.drive.server import Server
 from shared_control_env.drive.session import Choice
 

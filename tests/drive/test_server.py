@@ -15,8 +15,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from shared_control_env.drive.folders import RecordingsFolder
 from shared_control_env.drive.free import FreeDriving
-from shared_control_env.drive.seat import RecordingsFolder
 from shared_control_env.drive.session import Choice
 from shared_control_env.recordings.trial import Trial
 from tests.drive.conftest import Page, Serving
@@ -270,7 +270,7 @@ KILLED = """
 import sys
 from pathlib import Path
 from shared_control_env.drive.free import FreeDriving
-from shared_control_env.drive.seat import RecordingsFolder
+from shared_control_env.drive.folders import RecordingsFolder
 from shared_control_env.drive.server import Server
 from shared_control_env.drive.session import Choice
 folder = RecordingsFolder(Path(sys.argv[1]))

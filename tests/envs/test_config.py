@@ -80,7 +80,7 @@ def test_supercritical_within_the_models_range_warns():
 
 def test_merge_is_deep_and_keeps_the_rest():
     env = TwoLaneEnv({"driver_lag": {"K_h": 1.2}})
-    assert env.config["driver_lag"] == {"K_h": 1.2, "T_h": 0.2}
+    assert env.config["driver_lag"] == {"K_h": 1.2, "T_h": 0.2, "direct": False}
     assert len(env.config["vehicles"]) == 3
     assert TwoLaneEnv().config["driver_lag"]["K_h"] == 1.0
 

@@ -6,12 +6,11 @@ import json
 import re
 import time
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from filelock import FileLock, Timeout
-
-from shared_control_env.drive.seat import RecordingsFolder
+from shared_control_env.drive.folders import RecordingsFolder, locked
 from shared_control_env.drive.study.order import order_of
 from shared_control_env.drive.study.plan import Condition, Drives, Plan
 from shared_control_env.evaluation.storage import write_atomically
@@ -80,14 +79,8 @@ class StudyFolder:
     def __init__(self, path: Path, plan: Plan, code: str = "") -> None:
         self.plan, self._path = plan, path
         people = path / PEOPLE
-        try:
-            people.mkdir(parents=True, exist_ok=True)
-            self._lock = FileLock(path / ".lock")
-            self._lock.acquire(timeout=0)
-        except Timeout:
-            raise ValueError(f"{path}: another run of this study is going on; end it first") from None
-        except OSError as error:
-            raise ValueError(f"{path} cannot be written to: {error.strerror or error}") from None
+        self._kept = ExitStack()
+        self._kept.enter_context(locked(path))
         try:
             self._check_plan()
             enrolled = self.enrolled()
@@ -106,7 +99,7 @@ class StudyFolder:
 
     def close(self) -> None:
         """Release the folder."""
-        self._lock.release()
+        self._kept.close()
 
     def _check_plan(self) -> None:
         mine = self.plan.model_dump(mode="json")

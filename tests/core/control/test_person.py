@@ -154,7 +154,7 @@ def test_response_times_are_log_normal_over_persons():
 
 def test_the_arms_are_fitted_to_the_papers_five():
     (gain, gain_spread), (time, time_spread) = fitted_arms()
-    five = np.array([lag for name, lag in IDENTIFIED_DRIVERS.items() if name != "average"])
+    five = np.array([(lag.K_h, lag.T_h) for name, lag in IDENTIFIED_DRIVERS.items() if name != "average"])
     np.testing.assert_allclose([gain, time], stats.gmean(five))
     np.testing.assert_allclose([gain_spread, time_spread], np.log(five).std(axis=0, ddof=1))
     assert gain == pytest.approx(1.07, abs=0.01)

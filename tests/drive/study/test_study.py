@@ -147,7 +147,7 @@ def test_another_plan_is_not_mixed_in(plan, tmp_path):
 
 def test_a_study_has_one_person_at_a_time_and_codes_are_pseudonyms(plan, tmp_path):
     folder = StudyFolder(tmp_path / "study", plan)
-    with pytest.raises(ValueError, match="another run of this study"):
+    with pytest.raises(ValueError, match="another run is writing"):
         StudyFolder(tmp_path / "study", plan)
     folder.close()
     assert folder.code == "P01"

@@ -423,6 +423,8 @@ class DegradationParameters(NamedTuple):
         time_constant: correlation time of coloured noise [s].
         frequency: frequency of an oscillation [Hz].
         seed: seed of the noise.
+        profile: address of a recorded profile at the time steps since the onset; 0 for none.
+        profile_steps: number of its entries.
     """
 
     kind: int = 0
@@ -441,6 +443,8 @@ class DegradationParameters(NamedTuple):
     time_constant: Positive = 0.5
     frequency: Positive = 0.5
     seed: int = 0
+    profile: int = 0
+    profile_steps: int = 0
 
 
 class TrafficParameters(NamedTuple):

@@ -101,6 +101,10 @@ def add_degradation(name: str, degradation: Degradation) -> None:
     if degradation.kind not in KINDS:
         raise ValueError(f"degradation {name!r} has kind = {degradation.kind!r}; {hint(degradation.kind, KINDS)}")
     kind = KINDS[degradation.kind]
+    if kind.recorded:
+        raise ValueError(
+            f"degradation {name!r} has kind = {kind.name!r}, which plays a file: give it in 'faults' instead"
+        )
     wrong = [channel for channel in degradation.channels if channel not in kind.channels]
     if wrong or not degradation.channels or isinstance(degradation.channels, str):
         raise ValueError(f"degradation {name!r} has channels = {degradation.channels!r}; {hint(wrong, kind.channels)}")

@@ -137,5 +137,5 @@ def refresh_addresses(episodes: Sequence[Settings], starts: Starts | Batch) -> N
             ) from None
         starts.parameters["vehicle"]["tyre"][i] = fresh.vehicle.tyre
         starts.parameters["reward"]["addresses"][i] = fresh.reward.addresses
-        for name in ("act", "perceive", "advance"):
+        for name in ("act", "perceive", "advance", "profile", "profile_steps"):
             starts.faults[name][i, : len(faults)] = faults[name]

@@ -166,7 +166,7 @@ def axis_of(kind: str, channel: str = "steering", over: str = SIZE, size: float 
     Raises:
         ValueError: for an unknown kind, a channel that the kind does not have, or a size outside of physics.
     """
-    known = [name for name in KINDS if name != "none"]
+    known = [name for name in KINDS if name != "none" and not KINDS[name].recorded]
     if kind not in known:
         raise ValueError(f"kinds: {kind!r} is not a kind of degradation; {hint(kind, known)}")
     if channel not in KINDS[kind].channels:

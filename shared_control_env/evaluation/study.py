@@ -196,7 +196,9 @@ def _chosen_axes(kinds: str | Iterable[str], channel: str) -> dict[Axis, None]:
     """Axes of the kinds that a user names, each once."""
     if kinds == "all":
         return {
-            axis_of(name, channel): None for name, kind in KINDS.items() if name != "none" and channel in kind.channels
+            axis_of(name, channel): None
+            for name, kind in KINDS.items()
+            if name != "none" and not kind.recorded and channel in kind.channels
         }
     if isinstance(kinds, str):
         kinds = [kinds]

@@ -142,7 +142,7 @@ def _faded(c):
     return (1.0 - c.g * c.size) * c.u
 
 
-@pytest.mark.parametrize("name", [name for name in KINDS if name != "none"])
+@pytest.mark.parametrize("name", [name for name in KINDS if name != "none" and not KINDS[name].recorded])
 def test_every_kind_has_an_axis_that_begins_with_no_fault_and_grows(name):
     channel = KINDS[name].channels[0]
     axis = axis_of(name, channel)

@@ -69,9 +69,12 @@ def test_same_where_the_lane_is_narrower_than_the_vehicle(config):
 
 
 @pytest.mark.parametrize("kind", [kind.name for kind in KINDS.values() if kind.unit is not None])
-def test_same_in_episodes_that_begin_anew_under_a_degradation(kind):
+def test_same_in_episodes_that_begin_anew_under_a_degradation(kind, tmp_path):
     # What a degradation remembers of one episode must not act in the next.
     fault = {"kind": kind, "onset": 0.0, "size": 0.1, **({"seed": 1} if KINDS[kind].draws else {})}
+    if KINDS[kind].recorded:
+        (tmp_path / "profile.csv").write_text("t,value\n0,0\n0.3,1\n1,-1\n")
+        fault["file"] = str(tmp_path / "profile.csv")
     config = {"faults": [fault], "duration": 0.6, "authority": {"law": "none"}}
     single, many = gym.make(TWO_LANE, config=config), gym.make_vec(TWO_LANE, num_envs=3, config=config)
     assert compare(single, many, random_driver, episodes=3) == [12, 12, 12]

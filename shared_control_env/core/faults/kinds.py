@@ -8,25 +8,28 @@ effectiveness, stuck (lock in place), saturation, and so on. :func:`add_kind` ad
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import pi, sin
+from math import floor, pi, sin
 from typing import NamedTuple
 
 from shared_control_env.core.compile.calls import Interface, by_value
+from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.compile.memory import number_at
 from shared_control_env.core.faults.noise import coloured, standard_normal
 from shared_control_env.core.parameters import DegradationParameters
 from shared_control_env.core.records import MAX_DELAY, FaultMemory, Signals
 from shared_control_env.nearest import check_new_name, hint
 
-CHANNEL, RATE, SHARE, TIME, LENGTH = "channel", "rate", "share", "time", "length"
-"""Units of a size: the channel's unit [m/s^2 or rad], the channel's unit per second, a share in [0, 1], [s], or [m]."""
+CHANNEL, RATE, SHARE, TIME, LENGTH, FACTOR = "channel", "rate", "share", "time", "length", "factor"
+"""Units of a size: the channel's unit [m/s^2 or rad], the channel's unit per second, a share in [0, 1], [s], [m], or a
+factor of what was recorded [-]."""
 
 CHANNELS = ("steering", "acceleration", "both")
 """Channels that the settings of a fault may name."""
 
-HEEDED = ("seed", "time_constant", "frequency")
+HEEDED = ("seed", "time_constant", "frequency", "file")
 """Fields of a fault's settings that a kind may use beside its size."""
 
-UNITS = (CHANNEL, RATE, SHARE, TIME, LENGTH)
+UNITS = (CHANNEL, RATE, SHARE, TIME, LENGTH, FACTOR)
 
 
 class Acting(NamedTuple):
@@ -74,7 +77,8 @@ class Kind(NamedTuple):
         act: function that returns the degraded command of one channel, compiled with the signature :data:`ACT`.
         perceive: function that changes the automation's perception, compiled with the signature :data:`PERCEIVE`.
         advance: function that advances the memory at every step, compiled with the signature :data:`ADVANCE`.
-        heeds: fields of the settings that the kind uses besides its size: ``seed``, ``time_constant``, ``frequency``.
+        heeds: fields of the settings that the kind uses besides its size: ``seed``, ``time_constant``, ``frequency``,
+            ``file``.
         channels: channels that the settings of this kind may name. A kind that changes only the perception acts on
             none of them.
     """
@@ -91,6 +95,11 @@ class Kind(NamedTuple):
     def draws(self) -> bool:
         """Whether the kind draws random numbers; their seed is then part of its settings."""
         return "seed" in self.heeds
+
+    @property
+    def recorded(self) -> bool:
+        """Whether the kind plays a recorded profile, whose file is then part of its settings."""
+        return "file" in self.heeds
 
 
 def _bias(c: Acting) -> float:
@@ -158,6 +167,25 @@ def _sign_error(c: Acting) -> float:
     return -c.u
 
 
+@jit
+def _profile(c: Acting) -> float:
+    """The recorded profile at the present time since the onset, interpolated linearly and held beyond its end."""
+    x = max(c.k - c.fault.onset / c.dt, 0.0)
+    i = min(floor(x), c.fault.profile_steps - 1)
+    low = number_at(c.fault.profile, i)
+    return low + (x - i) * (number_at(c.fault.profile, min(i + 1, c.fault.profile_steps - 1)) - low)
+
+
+def _recorded_bias(c: Acting) -> float:
+    """``u + g size p(t - onset)`` with the recorded profile p."""
+    return c.u + c.g * c.size * _profile(c)
+
+
+def _recorded_command(c: Acting) -> float:
+    """``(1 - g) u + g size p(t - onset)``: the recorded profile p instead of the command."""
+    return (1.0 - c.g) * c.u + c.g * c.size * _profile(c)
+
+
 def _lane_offset(fault: DegradationParameters, g: float, signals: Signals) -> None:
     """The automation perceives the ego ``g size`` further to the left than it is."""
     signals.misperception[0] += g * fault.size
@@ -184,6 +212,8 @@ KINDS: dict[str, Kind] = {
         Kind("oscillation", CHANNEL, _oscillation, heeds=("frequency",)),
         Kind("drop_out", None, _drop_out),
         Kind("sign_error", None, _sign_error),
+        Kind("recorded_bias", FACTOR, _recorded_bias, heeds=("file",), channels=("steering", "acceleration")),
+        Kind("recorded_command", FACTOR, _recorded_command, heeds=("file",), channels=("steering", "acceleration")),
         Kind("lane_offset", LENGTH, perceive=_lane_offset, channels=("steering",)),
         Kind("missed_lead", None, perceive=_missed_lead, channels=("steering", "acceleration")),
     )

@@ -11,8 +11,9 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from shared_control_env.core import parameters as core
-from shared_control_env.core.faults.kinds import KINDS, LENGTH, RATE, SHARE, TIME, Kind
+from shared_control_env.core.faults.kinds import FACTOR, KINDS, LENGTH, RATE, SHARE, TIME, Kind
 from shared_control_env.core.records import MAX_DELAY
+from shared_control_env.envs.profiles import length_of
 from shared_control_env.envs.settings.changes import at, change, merge
 from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings, plain
 from shared_control_env.nearest import hint, nearest
@@ -22,6 +23,9 @@ LEAD_IN = 50.0
 
 LARGEST_OFFSET = 20.0
 """Largest offset of the perceived position [m]: several lanes."""
+
+LARGEST_FACTOR = 100.0
+"""Largest factor of a recorded fault [-]."""
 
 CUT_OFF = 3.0
 """Number of standard deviations at which log-normal draws are cut off [-]."""
@@ -164,6 +168,7 @@ def _check_faults(settings: Settings) -> None:
         for field in ("time_constant", "frequency"):
             _refuse_idle(name, fault, field, field in kind.heeds, f"{fault.kind} has none")
         _refuse_idle(name, fault, "seed", kind.draws, f"{fault.kind} draws nothing")
+        _refuse_idle(name, fault, "file", kind.recorded, f"{fault.kind} plays no recording")
         _refuse_idle(name, fault, "duty", fault.period > 0.0, "it needs a 'period'")
         if fault.channel not in kind.channels:
             why = (
@@ -176,9 +181,28 @@ def _check_faults(settings: Settings) -> None:
             continue
         if fault.size is None:
             raise ValueError(f"{name}['size'] is missing; {fault.kind} needs one")
+        if kind.recorded:
+            _check_profile(name, fault, settings)
         low, high = _sizes(kind, fault, settings)
         if not low <= fault.size <= high:
             raise ValueError(f"{name}['size'] = {fault.size} must lie in [{low:g}, {high:g}] for {fault.kind}")
+
+
+def _check_profile(name: str, fault: FaultSettings, settings: Settings) -> None:
+    """Check that a recorded fault has a file, and that its profile lasts for as long as the fault acts."""
+    if fault.file is None:
+        raise ValueError(f"{name}['file'] is missing; {fault.kind} plays one")
+    try:
+        length = length_of(fault.file)
+    except ValueError as error:
+        raise ValueError(f"{name}['file'] = {fault.file!r}: {error}") from None
+    left = max(settings.duration - fault.onset, 0.0)
+    wanted = left if fault.duration is None else min(fault.duration, left)
+    if length < wanted - 1.0 / settings.policy_frequency:
+        raise ValueError(
+            f"{name}['file'] = {fault.file!r} lasts {length:g} s, and the fault acts for {wanted:g} s; "
+            f"give it a 'duration' of at most {length:g}, or a longer file"
+        )
 
 
 def _sizes(kind: Kind, fault: FaultSettings, settings: Settings) -> tuple[float, float]:
@@ -189,6 +213,7 @@ def _sizes(kind: Kind, fault: FaultSettings, settings: Settings) -> tuple[float,
         TIME: (MAX_DELAY - 1) / settings.policy_frequency,
         RATE: 2.0 * bound * settings.policy_frequency,
         LENGTH: LARGEST_OFFSET,
+        FACTOR: LARGEST_FACTOR,
     }.get(kind.unit or "", 2.0 * bound)
     one_sided = kind.unit in (SHARE, TIME, RATE) or kind.draws  # a standard deviation has no sign
     return 0.0 if one_sided else -largest, largest

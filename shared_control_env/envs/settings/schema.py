@@ -160,6 +160,7 @@ class FaultSettings(Section):
     time_constant: Annotated[float, Interval(ge=1e-3, le=1e3)] = 0.5  # of coloured noise [s]
     frequency: Annotated[float, Interval(gt=0.0, le=1e3)] = 0.5  # of an oscillation [Hz]
     seed: Seed | None = None  # of noise; None for a random seed
+    file: Annotated[str, MaxLen(4096)] | None = None  # of a recorded fault: CSV or Parquet (envs.profiles)
 
 
 class RandomSettings(Section):

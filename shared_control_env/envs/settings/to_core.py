@@ -17,6 +17,7 @@ from shared_control_env.core.faults.kinds import CHANNEL, KINDS, RATE
 from shared_control_env.core.feedback.reward import TERMS, VALUE
 from shared_control_env.core.records import MAX_TERMS, pack, record_dtype
 from shared_control_env.core.world import tyre
+from shared_control_env.envs.profiles import resampled
 from shared_control_env.envs.settings.schema import Settings
 
 
@@ -113,6 +114,7 @@ def fault_records(settings: Settings) -> np.ndarray:
     for i, fault in enumerate(settings.faults):
         kind = KINDS[fault.kind]
         act, perceive, advance = kinds.addresses(kind)
+        profile = None if fault.file is None else resampled(fault.file, 1.0 / settings.policy_frequency)
         records[i] = pack(
             core.DegradationParameters(
                 kind=list(KINDS).index(fault.kind),
@@ -131,6 +133,8 @@ def fault_records(settings: Settings) -> np.ndarray:
                 time_constant=fault.time_constant,
                 frequency=fault.frequency,
                 seed=fault.seed or 0,
+                profile=0 if profile is None else profile.ctypes.data,
+                profile_steps=0 if profile is None else len(profile),
             )
         )
     return records

@@ -29,6 +29,11 @@ def fault_of(kind, **fields):
     return DegradationParameters(list(KINDS).index(kind), act, perceive, advance, in_unit_of_channel=in_unit, **fields)
 
 
+def played(kind):
+    """Where the profile of a kind that plays one lies."""
+    return {"profile": PROFILE.ctypes.data, "profile_steps": len(PROFILE)} if KINDS[kind].recorded else {}
+
+
 def faults_of(*entries):
     records = np.zeros(len(entries), record_dtype(DegradationParameters))
     for i, entry in enumerate(entries):
@@ -153,11 +158,14 @@ def test_drop_out_and_sign_error():
     assert steering("sign_error")[3] == -0.1
 
 
+PROFILE = np.full(40, 0.1)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_only_its_own_channels_are_touched(kind):
     commands = np.sin(np.arange(80.0))[:, None] * [4.0, 0.4]
     for channel, field in enumerate(d.CHANNELS):
-        out = run(commands, fault_of(kind, size=0.5, seed=1, **{field: True}))
+        out = run(commands, fault_of(kind, size=0.5, seed=1, **played(kind), **{field: True}))
         np.testing.assert_array_equal(out[:, 1 - channel], commands[:, 1 - channel])
         assert (kind in ("none", "lane_offset", "missed_lead")) == np.array_equal(out, commands)
 
@@ -177,9 +185,8 @@ def test_both_channels_take_the_same_share_of_their_limits():
 )
 def test_before_and_after_it_the_command_is_untouched_and_always_within_limits(kind, onset, ramp, duration, size, seed):
     commands = np.sin(np.arange(100.0))[:, None] * [4.0, 0.4]
-    fault = fault_of(
-        kind, acceleration=True, steering=True, onset=onset, ramp=ramp, duration=duration, size=size, seed=seed
-    )
+    timing = {"onset": onset, "ramp": ramp, "duration": duration}
+    fault = fault_of(kind, acceleration=True, steering=True, size=size, seed=seed, **timing, **played(kind))
     out = run(commands, fault)
     t = DT * np.arange(100)
     outside = (t < onset) | (t >= onset + duration)

@@ -345,12 +345,15 @@ def study(
                 "--wheel": bool(wheel),
                 "--torque": torque != 0.0,
             }
-            _refuse(person, "with --simulate")
+            _refuse({**person, "--port": port != 8642}, "with --simulate")
             with_simulated(checked, folder, _names(simulate), people, Remnant(steering=remnant), console)
         else:
             _refuse({"--people": people != 1, "--remnant": remnant != 0.0}, "without --simulate")
             _refuse({"--torque": torque != 0.0 and not wheel}, "without --wheel")
             with_person(checked, folder, code, port, browser, wheel, torque, console)
+
+
+IDENTIFIED = Path("results/identification")
 
 
 @app.command()
@@ -360,7 +363,7 @@ def identify(
     ],
     channel: Annotated[str, typer.Option(help="steering or acceleration.")] = "steering",
     condition: Annotated[str, typer.Option(help="Condition of a study; all but practice by default.")] = "",
-    out: Annotated[Path, typer.Option(help="Folder of table and report.")] = Path("results/identification"),
+    out: Annotated[Path, typer.Option(help="Folder of table and report.")] = IDENTIFIED,
 ) -> None:
     """Identify K_h and T_h of the people in recordings, beside the paper's Table IV."""
     from shared_control_env.evaluation.progress import progress_bar
@@ -371,6 +374,8 @@ def identify(
     console = Console()
     with _in_words(console):
         if place.suffix == ".npz":
+            of_people = {"--channel": channel != "steering", "--condition": bool(condition), "--out": out != IDENTIFIED}
+            _refuse(of_people, "on a CAN record")
             _print_can(place.expanduser(), console)
             return
         if channel not in CHANNELS:

@@ -33,11 +33,14 @@ def calibrated(device: str, name: str, samples: Mapping[str, Sequence[float]]) -
         samples: raw readings at each of :data:`STEPS`.
 
     Raises:
-        ValueError: if a step is missing, or nothing moved in one, in words.
+        ValueError: if a step is missing, the readings are not as many in each, or nothing moved in one, in words.
     """
     missing = [step for step in STEPS if step not in samples]
     if missing:
         raise ValueError(f"the calibration lacks {', '.join(missing)}; begin it again")
+    counts = {len(samples[step]) for step in STEPS}
+    if len(counts) > 1 or not counts - {0}:
+        raise ValueError("the number of readings changed from step to step, or there were none; begin again")
     steering = _moved(samples, "left", "right")
     throttle, brake = _moved(samples, "throttle", "released", steering), _moved(samples, "brake", "free", steering)
 
@@ -58,7 +61,7 @@ def calibrated(device: str, name: str, samples: Mapping[str, Sequence[float]]) -
 def _moved(samples: Mapping[str, Sequence[float]], first: str, second: str, but: int = -1) -> int:
     """The axis that differs most between two steps."""
     changes = [
-        0.0 if i == but else abs(a - b) for i, (a, b) in enumerate(zip(samples[first], samples[second], strict=False))
+        0.0 if i == but else abs(a - b) for i, (a, b) in enumerate(zip(samples[first], samples[second], strict=True))
     ]
     best = max(range(len(changes)), key=changes.__getitem__)
     if changes[best] < LEAST:

@@ -156,9 +156,6 @@ class Axes:
         self._first: np.ndarray | None = None
         self._moved = np.zeros(MOST_AXES, dtype=bool)
 
-    def reset(self) -> None:
-        """Keep what has moved: the device is the same in the next episode."""
-
     def command(self, readings: np.ndarray, dt: float) -> Command:
         """Command of the present readings.
 
@@ -193,9 +190,6 @@ class Simulated:
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
-
-    def reset(self) -> None:
-        """Nothing is kept."""
 
     def command(self, readings: np.ndarray, dt: float) -> Command:
         """Command of the present readings.

@@ -15,7 +15,7 @@ from shared_control_env.core.authority.laws import LAWS
 from shared_control_env.drive.devices import Command
 from shared_control_env.drive.folders import RecordingsFolder
 from shared_control_env.drive.protocol import Message, Replay, Simple, Start, check_device
-from shared_control_env.drive.seat import OVER, Seat
+from shared_control_env.drive.seat import EMPTY, OVER, Seat
 from shared_control_env.drive.session import BESIDE, Choice, Drive, result_of_model
 from shared_control_env.drive.view import SHOWN
 from shared_control_env.envs.degradations import DEGRADATIONS
@@ -90,20 +90,23 @@ class FreeDriving:
             case Simple(type="next") if self._start is not None:
                 await self._prepare(self._start.model_copy(update={"seed": self._start.seed + 1}))
             case Simple(type="leave"):
-                self.folder.unmark()
-                self._result = None
-                await self.seat.clear()
-                self.seat.send({"type": "state", "state": "empty"})
+                await self._leave()
             case Simple(type="recordings"):
                 self.seat.send({"type": "recordings", "names": self.folder.names()})
             case _:
                 raise ValueError(f"{message.type} has no meaning here")  # type: ignore[attr-defined]
 
+    async def _leave(self) -> None:
+        self.folder.unmark()
+        self._result = None
+        await self.seat.clear()
+        self.seat.send({"type": "state", "state": EMPTY})
+
     async def _prepare(self, start: Start) -> None:
         choice = Choice(start.scenario, start.degradation, start.authority, start.law, start.seed)
         self._result = None
-        await self.seat.prepare(choice, start.device, start.calibration, SHOWN, self._finished)
         self._start = start
+        await self.seat.prepare(choice, start.device, start.calibration, SHOWN, self._finished, self._leave)
 
     def _begin(self) -> None:
         self.seat.begin()
@@ -117,10 +120,12 @@ class FreeDriving:
         calibration = None if start.calibration is None else start.calibration.model_dump()
         trial = drive.trial({"device": start.device, "calibration": calibration})
         path = await asyncio.to_thread(self.folder.add, time.strftime("drive-%Y%m%d-%H%M%S"), trial)
-        self.folder.unmark()
+        if self.seat.drive is drive:
+            self.folder.unmark()
         beside = await asyncio.to_thread(result_of_model, drive.choice)
-        self._result = result_message(drive, trial, beside, path)
-        self.seat.send(self._result)
+        if self.seat.drive is drive:  # and not the next one already
+            self._result = result_message(drive, trial, beside, path)
+            self.seat.send(self._result)
 
     async def _replay(self, name: str) -> None:
         trial = await asyncio.to_thread(Trial.read, self.folder.find(name))
@@ -131,7 +136,7 @@ class FreeDriving:
             self._result = {"type": "replayed", "name": name, "same": playback.same(drive), "versions": versions()}
             self.seat.send(self._result)
 
-        await self.seat.prepare(Choice(**trial.header["choice"]), "simulated", None, SHOWN, finished)
+        await self.seat.prepare(Choice(**trial.header["choice"]), "simulated", None, SHOWN, finished, self._leave)
         self.seat.play(playback)
 
 

@@ -23,8 +23,8 @@ FULL_FORCE = 0x7FFF
 REACH = 0.1
 """Difference between automation and wheel at which the force is at its cap, as a share of full lock [-]."""
 
-LEFT_TO_RIGHT = 0x4000
-"""Direction of a force along the wheel's axis, in the kernel's units."""
+TO_THE_LEFT = 0x4000
+"""Direction of a force, in the kernel's units: 0x4000 is left, 0xC000 right (``linux/input.h``)."""
 
 
 class Joystick(Protocol):
@@ -52,26 +52,28 @@ class NativeWheel:
 
     Args:
         joystick: the device.
-        pump: lets the readings be updated.
+        attached: updates the readings, and says whether the device is still there.
         feedback: turns the wheel; None for no forces.
 
     Attributes:
         name: name of the device.
     """
 
-    def __init__(self, joystick: Joystick, pump: Callable[[], object], feedback: Feedback | None = None) -> None:
-        self._joystick, self._pump, self._feedback = joystick, pump, feedback
+    def __init__(self, joystick: Joystick, attached: Callable[[], bool], feedback: Feedback | None = None) -> None:
+        self._joystick, self._attached, self._feedback = joystick, attached, feedback
         self.name = joystick.get_name()
 
     def read(self, now: float) -> tuple[np.ndarray, float]:
-        """Raw axes, and their age [s]: they are read now, and what the device itself takes is not known.
+        """Raw axes, and their age [s]; infinite if the device has gone.
+
+        They are read now, so that their age is 0: what the device itself takes is not known.
 
         Args:
             now: the server's clock [s]; not used.
         """
-        self._pump()
+        there = self._attached()
         n = min(self._joystick.get_numaxes(), MOST_AXES)
-        return np.array([self._joystick.get_axis(i) for i in range(n)]).clip(-1.0, 1.0), 0.0
+        return np.array([self._joystick.get_axis(i) for i in range(n)]).clip(-1.0, 1.0), 0.0 if there else np.inf
 
     def push(self, automation: float, full: float, calibration: Calibration | None) -> None:
         """Push the wheel towards the automation's angle, if forces are on.
@@ -125,7 +127,7 @@ class Feedback:
         """
         share = self._torque * min(max(difference / REACH, -1.0), 1.0)
         started = self._constant >= 0
-        effect = self._effect(self._codes.FF_CONSTANT, self._constant, round(-share * FULL_FORCE))
+        effect = self._effect(self._codes.FF_CONSTANT, self._constant, round(share * FULL_FORCE))
         self._constant = self._device.upload_effect(effect)
         if not started:
             self._device.write(self._codes.EV_FF, self._constant, 1)
@@ -144,7 +146,7 @@ class Feedback:
             stiff = round(self._torque * FULL_FORCE)
             spring = ff.Condition(2 * stiff, 2 * stiff, stiff, stiff, 0, 0)
             what = ff.EffectType(ff_condition_effect=(ff.Condition * 2)(spring, spring))
-        return ff.Effect(kind, number, LEFT_TO_RIGHT, ff.Trigger(0, 0), ff.Replay(0, 0), what)
+        return ff.Effect(kind, number, TO_THE_LEFT, ff.Trigger(0, 0), ff.Replay(0, 0), what)
 
 
 def open_wheel(name: str, torque: float = 0.0) -> NativeWheel:
@@ -164,7 +166,14 @@ def open_wheel(name: str, torque: float = 0.0) -> NativeWheel:
     pygame.display.init()
     pygame.joystick.init()
     found: Sequence[Any] = [pygame.joystick.Joystick(i) for i in range(pygame.joystick.get_count())]
-    return NativeWheel(chosen := choose(found, name), pygame.event.pump, feedback_of(chosen.get_name(), torque))
+    chosen = choose(found, name)
+    gone: set[int] = set()
+
+    def attached() -> bool:
+        gone.update(event.instance_id for event in pygame.event.get(pygame.JOYDEVICEREMOVED))
+        return chosen.get_instance_id() not in gone  # type: ignore[attr-defined]
+
+    return NativeWheel(chosen, attached, feedback_of(chosen.get_name(), torque))
 
 
 def choose(found: Sequence[Joystick], name: str) -> Joystick:

@@ -32,6 +32,7 @@ class Input(Message):
     echo: Count = -1
     held: Seconds = 0.0
     readings: Annotated[list[Reading], Len(1, MOST_AXES)]
+    device: Literal["keyboard", "gamepad", "wheel", "simulated"] = "keyboard"
 
 
 class Start(Message):

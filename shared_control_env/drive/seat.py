@@ -51,10 +51,13 @@ class Seat:
         self._road: dict[str, Any] = {}
         self._frame: dict[str, Any] = {}
         self._number = 0
+        self._line = Line()
         self._samples: dict[str, list[float]] = {}
         self._source: Any = None
         self._ticker: asyncio.Task[None] | None = None
         self._finished: Callable[[Drive], Coroutine[Any, Any, None]] | None = None
+        self._failed: Callable[[], Coroutine[Any, Any, None]] | None = None
+        self._begun, self._answered, self._width, self._kind = 0.0, False, 0, ""
 
     drive: Drive | None
 
@@ -71,6 +74,7 @@ class Seat:
         calibration: Calibration | None,
         shown: tuple[str, ...],
         finished: Callable[[Drive], Coroutine[Any, Any, None]],
+        failed: Callable[[], Coroutine[Any, Any, None]],
     ) -> None:
         """Make a drive ready; what has to be compiled is compiled now, and not while the person drives.
 
@@ -80,9 +84,10 @@ class Seat:
             calibration: its calibration, of a gamepad or wheel.
             shown: what the gauges show.
             finished: called when the episode is over.
+            failed: called when a step or ``finished`` has failed, which the pages have been told.
 
         Raises:
-            ValueError: if the choice is not possible.
+            ValueError: if the choice is not possible, or the device lacks axes of the calibration.
         """
         await self.clear()
         self.state = PREPARING
@@ -92,7 +97,7 @@ class Seat:
         except BaseException:
             self.state = EMPTY
             raise
-        self.drive, self.shown, self._finished = drive, shown, finished
+        self.drive, self.shown, self._finished, self._failed = drive, shown, finished, failed
         self._device: Keyboard | Axes | Simulated = (
             Keyboard(drive.limits)
             if device == KEYBOARD
@@ -102,7 +107,11 @@ class Seat:
         )
         self._source = self.native if device == WHEEL else None  # two devices never mix
         self._calibration, self._readings = calibration, np.zeros(self._device.readings)
-        self._line, self._road = Line(), road_of(drive)
+        if self._source is not None and len(self._source.read(self.clock())[0]) < self._device.readings:
+            await self.clear()
+            raise ValueError(f"{self.native.name!r} has fewer axes than its calibration; calibrate it again")
+        self._line, self._road = Line(), {**road_of(drive), "device": device, "native": self._source is not None}
+        self._width, self._kind = 0, device
         self.state = READY
         chosen = {"choice": choice._asdict()} if self.with_scene else {}
         self.send({"type": "road", **self._road, **chosen})
@@ -134,7 +143,7 @@ class Seat:
         if self.state not in (READY, PAUSED):
             raise ValueError(f"there is nothing to begin: the seat is {self.state}")
         self.state = DRIVING
-        self._line = Line()
+        self._begun, self._answered = self.clock(), False
         self.send({"type": "state", "state": DRIVING})
         if self.in_step:
             self._show(self.clock())  # the simulated person answers this frame
@@ -156,6 +165,10 @@ class Seat:
         self._rest()
         self.send({"type": "state", "state": PAUSED, "reason": reason})
 
+    def greet(self) -> None:
+        """Another page drives from now on, whose clock is another one."""
+        self._line, self._answered = Line(), False
+
     async def receive(self, message: Input) -> None:
         """Take an input of the page.
 
@@ -165,13 +178,19 @@ class Seat:
         Raises:
             ValueError: if the device has more readings than these.
         """
-        if self.drive is None or self.state not in (READY, DRIVING) or self._source is not None:
+        if self.drive is None or self.state not in (READY, DRIVING, PAUSED) or message.device != self._kind:
             return
-        if len(message.readings) < self._device.readings:
-            raise ValueError(f"readings: {len(message.readings)} of them; the device has {self._device.readings}")
-        self._readings = np.array(message.readings)
         now = self.clock()
         self._line.received(message.stamp, message.echo, message.held, now)
+        self._answered = True
+        if self._source is not None:
+            return  # the server reads the device itself; the page only shows that it is there
+        if len(message.readings) < self._device.readings:
+            raise ValueError(f"readings: {len(message.readings)} of them; the device has {self._device.readings}")
+        if self._width and len(message.readings) != self._width:
+            self.pause(f"another device: {len(message.readings)} readings, where there were {self._width}")
+            return
+        self._readings, self._width = np.array(message.readings), len(message.readings)
         if self.in_step and self.state == DRIVING and message.echo == self._number:
             await self._tick(now, 0.0)
 
@@ -195,6 +214,8 @@ class Seat:
     async def clear(self) -> None:
         """Leave the drive, whose recording is dropped unless it has been written."""
         self.state = EMPTY
+        self._rest()
+        self._source = None
         if self._ticker is not None and self._ticker is not asyncio.current_task():
             self._ticker.cancel()
             await asyncio.gather(self._ticker, return_exceptions=True)
@@ -213,10 +234,21 @@ class Seat:
         try:
             await self._keep_ticking()
         except Exception as error:
-            logging.getLogger(__name__).exception("a step failed")
-            self.state = EMPTY
-            self.send({"type": "refused", "message": f"the drive ended by {type(error).__name__}: {error}"})
-            self.send({"type": "state", "state": EMPTY})
+            await self._fail(error)
+
+    async def _finish(self, drive: Drive) -> None:
+        """Let the programme write and show the drive; an error is told, and what was driven is lost."""
+        assert self._finished is not None
+        try:
+            await self._finished(drive)
+        except Exception as error:
+            await self._fail(error)
+
+    async def _fail(self, error: Exception) -> None:
+        logging.getLogger(__name__).error("the drive is lost", exc_info=error)
+        self.send({"type": "refused", "message": f"the drive is lost by {type(error).__name__}: {error}"})
+        assert self._failed is not None
+        await self._failed()
 
     async def _keep_ticking(self) -> None:
         assert self.drive is not None
@@ -235,7 +267,7 @@ class Seat:
     async def _tick(self, now: float, lateness: float) -> None:
         drive = self.drive
         assert drive is not None
-        age = self._line.age(now)
+        age = self._line.age(now) if self._answered else now - self._begun
         if self._source is not None:
             self._readings, age = self._source.read(now)
         timing = Timing(lateness, age, self._line.round_trip)
@@ -254,8 +286,7 @@ class Seat:
             self.state = OVER
             self._rest()
             self.send({"type": "state", "state": OVER})
-            assert self._finished is not None
-            task = asyncio.create_task(self._finished(drive))
+            task = asyncio.create_task(self._finish(drive))
             _KEPT.add(task)
             task.add_done_callback(_KEPT.discard)
 

@@ -90,7 +90,7 @@ class Page:
         self._messages: deque[str] = deque()
         self._frame = ""
         self._more = asyncio.Event()
-        self.slow = False
+        self.slow = asyncio.Event()
 
     def put(self, message: dict[str, Any]) -> None:
         """Let a message wait for its turn.
@@ -98,6 +98,9 @@ class Page:
         Args:
             message: the message.
         """
+        if len(self._messages) > MOST_WAITING:
+            self.slow.set()
+            return
         text = json.dumps(message, allow_nan=False)
         if message["type"] == "frame":
             self._frame = text
@@ -106,12 +109,11 @@ class Page:
                 self._messages.append(self._frame)
                 self._frame = ""
             self._messages.append(text)
-        self.slow |= len(self._messages) > MOST_WAITING
         self._more.set()
 
     async def send(self) -> None:
-        """Send what waits, for as long as the page is connected and keeps up."""
-        while not self.slow:
+        """Send what waits, for as long as the page is connected."""
+        while True:
             await self._more.wait()
             self._more.clear()
             while self._messages:
@@ -243,7 +245,7 @@ class Server:
         page = Page(socket)
         self._pages.append(page)
         self._introduce(page)
-        tasks = [asyncio.create_task(page.send()), asyncio.create_task(self._listen(page))]
+        tasks = [asyncio.create_task(part) for part in (page.send(), self._listen(page), page.slow.wait())]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -251,11 +253,13 @@ class Server:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             self._leave(page)
-            with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # where the page has gone already
-                await socket.close(POLICY, "too slow" if page.slow else "")
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect, TimeoutError):  # where it has gone already
+                await asyncio.wait_for(socket.close(POLICY, "too slow" if page.slow.is_set() else ""), 1.0)
 
     def _introduce(self, page: Page) -> None:
         role = "driver" if self._pages[0] is page else "spectator"
+        if role == "driver":
+            self.seat.greet()
         page.put({"type": "welcome", "role": role, **self.programme.welcome()})
         for message in self.programme.present():
             page.put(message)

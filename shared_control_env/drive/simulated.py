@@ -14,6 +14,7 @@ from shared_control_env.controllers.driver import Driver, PersonDriver, checked_
 from shared_control_env.core.entries import advance_arm
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import SCENE, pack
+from shared_control_env.drive.devices import SIMULATED
 from shared_control_env.drive.session import Choice
 from shared_control_env.envs.settings import parameters_of
 from shared_control_env.evaluation.catalogue import DRIVERS, DriverEntry
@@ -136,7 +137,8 @@ async def take_part(url: str, origin: str, person: SimulatedPerson) -> None:
                 scene = np.frombuffer(bytes.fromhex(message["scene"]), SCENE).reshape(())
                 observation = np.frombuffer(bytes.fromhex(message["observation"]), np.float32)
                 readings = person.shares(observation, scene)
-                await _say(connection, type="input", seq=seq, stamp=message["t"], echo=message["n"], readings=readings)
+                about = {"seq": seq, "stamp": message["t"], "echo": message["n"], "device": SIMULATED}
+                await _say(connection, type="input", **about, readings=readings)
                 seq += 1
 
 

@@ -47,7 +47,7 @@ class Findings(NamedTuple):
         engaged: share of it with the automation steering [-].
         by_hand: time without it [s].
         delay: delay from command to motor torque at which they correlate most, while it steers [s].
-        correlation: that correlation [-].
+        correlation: that correlation [-]; negative if the two have opposite signs.
         torque: largest torque of the driver while the automation steers [counts].
         pushing: share of the time with the automation steering in which the driver pushes [-].
         conflict: share of that in which driver and motor push against each other [-]; nan if the driver never pushes.
@@ -108,7 +108,7 @@ def study(record: Record) -> Findings:
         record: the record.
 
     Raises:
-        ValueError: if the automation never steers for as long as the largest delay.
+        ValueError: if the automation hardly steers, or if no delay can be told.
     """
     signals = record.signals
     steers = signals["request"] > 0.5
@@ -117,12 +117,19 @@ def study(record: Record) -> Findings:
             f"the automation steers for {steers.sum() / RATE:.1f} s; at least {4 * LONGEST_DELAY:g} s are needed"
         )
     command, motor = signals["command"], signals["motor_torque"]
+    for name in ("command", "motor_torque"):
+        if np.ptp(signals[name][steers]) == 0.0:
+            raise ValueError(f"{name!r} is constant while the automation steers, so that no delay can be told")
     lags = np.arange(int(LONGEST_DELAY * RATE) + 1)
     found = []
     for lag in lags:
         both = steers[: len(steers) - lag] & steers[lag:]
         found.append(np.corrcoef(command[: len(command) - lag][both], motor[lag:][both])[0, 1])
-    best = int(np.argmax(found))
+    best = int(np.argmax(np.abs(found)))  # the two may have opposite signs
+    if best == lags[-1]:
+        raise ValueError(
+            f"command and motor torque correlate most at {LONGEST_DELAY:g} s or beyond, the end of the search"
+        )
     pushes = steers & (np.abs(signals["driver_torque"]) > TOUCHED)
     against = pushes & (signals["driver_torque"] * motor < 0.0)
     return Findings(

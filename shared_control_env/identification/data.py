@@ -31,6 +31,7 @@ class Drives(NamedTuple):
         v: input u_h,des - u_a,act, shape (n, T) [rad or m/s^2].
         y: output u_h,act, shape (n, T) [rad or m/s^2].
         outside: what does not depend on the person: the fault and the target position, shape (n, T, 2).
+        lengths: number of steps of each drive, shape (n,).
         counts: whether a step counts: it is there, and the command is not at its limit, shape (n, T).
         dt: time step [s].
         simulated: name of the driver that simulated the person; empty for a real one.
@@ -42,6 +43,7 @@ class Drives(NamedTuple):
     v: np.ndarray
     y: np.ndarray
     outside: np.ndarray
+    lengths: np.ndarray
     counts: np.ndarray
     dt: float
     simulated: str
@@ -55,7 +57,12 @@ class Drives(NamedTuple):
         """
         names = tuple(np.array(self.names)[rows])
         return self._replace(
-            names=names, v=self.v[rows], y=self.y[rows], outside=self.outside[rows], counts=self.counts[rows]
+            names=names,
+            v=self.v[rows],
+            y=self.y[rows],
+            outside=self.outside[rows],
+            lengths=self.lengths[rows],
+            counts=self.counts[rows],
         )
 
 
@@ -146,4 +153,5 @@ def _stacked(code: str, trials: Sequence[tuple[str, Trial]], channel: int) -> Dr
         notes.append(f"{len(flagged)} trials with an input age above 40 ms (95th percentile) are used")
     names = tuple(name for name, _ in trials)
     simulated = {trial.header.get("simulated", "") for _, trial in trials}
-    return Drives(code, names, v, y, outside, counts, rates.pop(), ", ".join(sorted(simulated)), tuple(notes))
+    lengths = np.array([len(trial) for _, trial in trials])
+    return Drives(code, names, v, y, outside, lengths, counts, rates.pop(), ", ".join(sorted(simulated)), tuple(notes))

@@ -50,20 +50,16 @@ def diagnose(drives: Drives, estimate: Estimate) -> Diagnostics:
     for i in range(min(FOLDS, n)):
         fitted = box_jenkins(drives.part(fold != i), not np.isnan(estimate.delay.value), resamples=2)
         held_out = drives.part(fold == i)
-        for y, y_hat, counts in zip(
-            held_out.y, respond(held_out.v, fitted.arm, drives.dt), held_out.counts, strict=True
-        ):
-            fits.append(fit(y[counts], y_hat[counts]))
-            vafs.append(variance_accounted_for(y[counts], y_hat[counts]))
-    theta = {
-        "K_h": estimate.K_h.value,
-        "T_h": estimate.T_h.value,
-        "delay": estimate.arm.delay,
-        "rho": estimate.rho.value,
-    }
-    e = innovations(drives, theta)
+        y_hat = respond(held_out.v, fitted.arm, drives.dt) + fitted.offset.value
+        for y, simulated, counts in zip(held_out.y, y_hat, held_out.counts, strict=True):
+            if counts.sum() > 2 * LAGS:
+                fits.append(fit(y[counts], simulated[counts]))
+                vafs.append(variance_accounted_for(y[counts], simulated[counts]))
+    if not fits:
+        return Diagnostics(*(np.nan for _ in Diagnostics._fields))
+    e = innovations(drives, estimate.theta)
     kept = [row[counts][1:] for row, counts in zip(e, drives.counts, strict=True)]
-    white = [ljung_box(row) > 0.05 for row in kept if len(row) > 2 * LAGS]
+    white = [ljung_box(row, fitted=1) > 0.05 for row in kept if len(row) > 2 * LAGS]
     crossed = [
         _crossed(row[counts][1:], v[counts][1:])
         for row, v, counts in zip(e, drives.v, drives.counts, strict=True)
@@ -91,18 +87,19 @@ def variance_accounted_for(y: np.ndarray, y_hat: np.ndarray) -> float:
     return 100.0 * (1.0 - float(np.var(y - y_hat)) / max(float(np.var(y)), 1e-24))
 
 
-def ljung_box(e: np.ndarray, lags: int = LAGS) -> float:
+def ljung_box(e: np.ndarray, lags: int = LAGS, fitted: int = 0) -> float:
     """p-value of the Ljung-Box test that a series is white.
 
     Args:
         e: the series, shape (T,).
         lags: number of lags.
+        fitted: number of parameters of the model whose residuals these are.
     """
     T = len(e)
     centred = e - e.mean()
     square = float(centred @ centred) or 1.0
     r = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, lags + 1)]) / square
-    return float(chi2.sf(T * (T + 2.0) * np.sum(r**2 / (T - np.arange(1, lags + 1))), lags))
+    return float(chi2.sf(T * (T + 2.0) * np.sum(r**2 / (T - np.arange(1, lags + 1))), lags - fitted))
 
 
 def _crossed(e: np.ndarray, v: np.ndarray) -> float:

@@ -24,10 +24,10 @@ LEVEL = 0.95
 LAGS = (0, 1, 2, 4, 7, 11)
 """Lags of the instruments [steps]."""
 
-BOUNDS = {"K_h": (0.0, 10.0), "T_h": (0.005, 3.0), "delay": (0.0, 0.5), "rho": (-0.99, 0.99)}
-"""Range in which each parameter is searched [-, s, s, -]."""
+BOUNDS = {"K_h": (0.0, 10.0), "T_h": (0.005, 3.0), "delay": (0.0, 0.5), "rho": (-0.99, 0.99), "offset": (-10.0, 10.0)}
+"""Range in which each parameter is searched [-, s, s, -, rad or m/s^2]."""
 
-_START = {"K_h": 1.0, "T_h": 0.2, "delay": 0.05, "rho": 0.5}
+_START = {"K_h": 1.0, "T_h": 0.2, "delay": 0.05, "rho": 0.5, "offset": 0.0}
 
 
 class Value(NamedTuple):
@@ -51,6 +51,8 @@ class Estimate(NamedTuple):
         K_h, T_h: gain [-] and time constant [s].
         delay: delay [s]; nan where it is taken to be 0.
         rho: correlation of the remnant from one step to the next [-]; nan where it has no model.
+        offset: constant of the output, such as a wheel that does not stand straight [rad or m/s^2]; nan where it is
+            not estimated.
         found: whether the method came to a result.
     """
 
@@ -59,6 +61,7 @@ class Estimate(NamedTuple):
     T_h: Value
     delay: Value
     rho: Value
+    offset: Value
     found: bool
 
     @property
@@ -66,13 +69,18 @@ class Estimate(NamedTuple):
         """The arm of the estimate."""
         return Arm(self.K_h.value, self.T_h.value, 0.0 if np.isnan(self.delay.value) else self.delay.value)
 
+    @property
+    def theta(self) -> dict[str, float]:
+        """The parameters that :func:`innovations` takes."""
+        return {**self.arm._asdict(), "rho": self.rho.value, "offset": self.offset.value}
+
 
 def box_jenkins(drives: Drives, delay: bool = False, resamples: int = RESAMPLES) -> Estimate:
     """Output error with a remnant that is a first-order process, by least squares of its innovations.
 
     ::
 
-        y = respond(v) + n,   n(k) = rho n(k-1) + e(k)
+        y = respond(v) + c + n,   n(k) = rho n(k-1) + e(k)
 
     The interval comes from resampling whole trials. Each resample takes one Gauss-Newton step from the estimate, which
     is as accurate as the normal approximation of a full search and needs no search (Davidson & MacKinnon, Econometric
@@ -83,7 +91,7 @@ def box_jenkins(drives: Drives, delay: bool = False, resamples: int = RESAMPLES)
         delay: whether the delay is estimated too.
         resamples: number of resamples.
     """
-    names = ["K_h", "T_h", *(["delay"] if delay else []), "rho"]
+    names = ["K_h", "T_h", *(["delay"] if delay else []), "rho", "offset"]
     scale = float(np.std(drives.y[drives.counts])) or 1.0
 
     def residuals(theta: np.ndarray) -> np.ndarray:
@@ -91,13 +99,20 @@ def box_jenkins(drives: Drives, delay: bool = False, resamples: int = RESAMPLES)
 
     low, high = np.array([BOUNDS[name] for name in names]).T
     start = np.array([_START[name] for name in names])
-    result = least_squares(residuals, start, bounds=(low, high), x_scale=[0.3] * len(names), method="trf")
+    result = least_squares(
+        residuals,
+        start,
+        bounds=(low, high),
+        x_scale=[0.3 if name != "offset" else scale for name in names],
+        method="trf",
+    )
     n = len(drives.names)
     jacobian = result.jac.reshape(n, -1, len(names))
     e = result.fun.reshape(n, -1)
     gradients, squares = np.einsum("ntp,nt->np", jacobian, e), np.einsum("ntp,ntq->npq", jacobian, jacobian)
     intervals = studentised(result.x, gradients, squares, resamples)
-    inside = bool(np.all((result.x > low + 1e-6) & (result.x < high - 1e-6)))
+    free = [i for i, name in enumerate(names) if name != "delay"]  # a delay of 0 is a result, not a failure
+    inside = bool(np.all((result.x > low + 1e-6)[free]) and np.all(result.x < high - 1e-6))
     values = {name: Value(float(x), *ends) for name, x, ends in zip(names, result.x, intervals, strict=True)}
     none = Value(nan, nan, nan)
     return Estimate(
@@ -106,7 +121,8 @@ def box_jenkins(drives: Drives, delay: bool = False, resamples: int = RESAMPLES)
         values["T_h"],
         values.get("delay", none),
         values["rho"],
-        bool(result.success) and (inside or delay),
+        values["offset"],
+        bool(result.success) and inside,
     )
 
 
@@ -115,10 +131,10 @@ def innovations(drives: Drives, theta: dict[str, Any]) -> np.ndarray:
 
     Args:
         drives: drives of a person.
-        theta: K_h, T_h, rho, and delay where it is not 0.
+        theta: K_h, T_h, rho, offset, and delay where it is not 0.
     """
     arm = Arm(theta["K_h"], theta["T_h"], theta.get("delay", 0.0))
-    n = drives.y - respond(drives.v, arm, drives.dt)
+    n = drives.y - respond(drives.v, arm, drives.dt) - theta["offset"]
     e = np.zeros_like(n)
     e[:, 1:] = (n[:, 1:] - theta["rho"] * n[:, :-1]) * (drives.counts[:, 1:] & drives.counts[:, :-1])
     return e
@@ -180,7 +196,7 @@ def instrumental(drives: Drives, resamples: int = RESAMPLES) -> Estimate:
     theta = _two_stage(zx.sum(axis=0), zz.sum(axis=0), zy.sum(axis=0))
     arm = _as_arm(theta, drives.dt)
     if arm is None:
-        return Estimate("instrumental variables", none, none, none, none, False)
+        return Estimate("instrumental variables", none, none, none, none, none, False)
     rng, n = np.random.default_rng(0), len(drives.names)
     drawn = []
     for weights in rng.multinomial(n, np.full(n, 1.0 / n), size=resamples):
@@ -190,10 +206,10 @@ def instrumental(drives: Drives, resamples: int = RESAMPLES) -> Estimate:
     known = np.array(drawn)
     ends = [0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL)]
     if np.isnan(known).any(axis=1).mean() > 1.0 - LEVEL:
-        return Estimate("instrumental variables", none, none, none, none, False)
+        return Estimate("instrumental variables", none, none, none, none, none, False)
     low, high = np.nanquantile(known, ends, axis=0)
     values = [Value(value, float(a), float(b)) for value, a, b in zip(arm, low, high, strict=True)]
-    return Estimate("instrumental variables", values[0], values[1], none, none, True)
+    return Estimate("instrumental variables", values[0], values[1], none, none, none, True)
 
 
 def _moments(drives: Drives) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -51,8 +51,8 @@ def identify(
     table = table_of(people)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        table.to_csv(out / TABLE, index=False)
         write_report(people, table, refused, channel, place, out / REPORT)
+        table.to_csv(out / TABLE, index=False)
     return table, refused
 
 
@@ -72,7 +72,7 @@ def table_of(people: dict[str, Person]) -> pd.DataFrame:
                 "method": estimate.method,
                 "found": estimate.found,
             }
-            for name in ("K_h", "T_h", "delay", "rho"):
+            for name in ("K_h", "T_h", "delay", "rho", "offset"):
                 value = getattr(estimate, name)
                 row |= {name: value.value, f"{name}_low": value.low, f"{name}_high": value.high}
             first = estimate is person.estimate

@@ -83,9 +83,10 @@ def draw_fit(person: Person, channel: str) -> Figure:
     axes = np.atleast_1d(figure.subplots(1, len(shown), sharey=True))
     t = np.arange(drives.y.shape[1]) * drives.dt
     for axis, i in zip(axes, shown, strict=True):
-        y_hat = respond(drives.v[i], person.estimate.arm, drives.dt)
-        axis.plot(t, drives.y[i], color=INK, lw=1.0, label="recorded")
-        axis.plot(t, y_hat, color=COLOURS[0], lw=1.4, label="arm of Eq. 16")
+        T = drives.lengths[i]
+        y_hat = respond(drives.v[i], person.estimate.arm, drives.dt) + person.estimate.offset.value
+        axis.plot(t[:T], drives.y[i, :T], color=INK, lw=1.0, label="recorded")
+        axis.plot(t[:T], y_hat[:T], color=COLOURS[0], lw=1.4, label="arm of Eq. 16")
         axis.set(title=drives.names[i], xlabel="t [s]")
         axis.spines[["top", "right"]].set_visible(False)
     axes[0].set_ylabel(f"u_h,act [{'rad' if channel == 'steering' else 'm/s^2'}]")
@@ -99,11 +100,12 @@ def draw_residuals(person: Person) -> Figure:
     Args:
         person: what was identified.
     """
-    drives, estimate = person.drives, person.estimate
-    theta = {"K_h": estimate.K_h.value, "T_h": estimate.T_h.value, "rho": estimate.rho.value}
-    e = innovations(drives, theta)
+    drives = person.drives
+    e = innovations(drives, person.estimate.theta)
     rows = [(a[c][1:], v[c][1:]) for a, v, c in zip(e, drives.v, drives.counts, strict=True) if c.sum() > 2 * LAGS]
     lags = np.arange(LAGS + 1)
+    if not rows:
+        return Figure(figsize=(11.0, 0.3))
     own = np.mean([_correlations(a, a) for a, _ in rows], axis=0)
     cross = np.mean([_correlations(a, v) for a, v in rows], axis=0)
     bound = 1.96 / np.sqrt(sum(len(a) for a, _ in rows))

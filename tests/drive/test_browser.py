@@ -160,3 +160,30 @@ def test_a_gamepad_is_calibrated_and_drives(opened):
     opened.execute_script("window.pad.axes = [-0.6, 0, 1]")
     time.sleep(0.4)
     assert frame(opened)["wheel"][1] > 0.05
+
+
+def test_after_a_reload_the_page_drives_with_the_same_device(opened):
+    """And not with the keyboard, whose keys would be taken for axes."""
+    made_up = "window.pad = {id: 'made up', connected: true, axes: [0, 0, 1], buttons: []}; navigator.getGamepads = () => [window.pad];"
+    opened.execute_script(made_up)
+    choose(opened, scenario="lane_keeping", degradation="none", device="gamepad")
+    press(opened, "Drive")
+    for axes in ([-1, 0, 1], [1, 0, 1], [0, 0, 1], [0, -1, 1], [0, 0, 1], [0, 0, -1], [0, 0, 1]):
+        opened.execute_script("window.pad.axes = arguments[0]", axes)
+        press(opened, "Next")
+        time.sleep(0.05)
+    wait(opened, "ready")
+    key(opened, " ")
+    wait(opened, "driving")
+    opened.refresh()
+    wait(opened, "paused")
+    opened.execute_script(made_up)
+    assert opened.execute_script("return window.drive.input.device") == "gamepad"
+    key(opened, "ArrowLeft")
+    key(opened, " ")
+    wait(opened, "driving")
+    time.sleep(0.3)
+    assert frame(opened)["wheel"][1] == 0.0
+    opened.execute_script("window.pad.axes = [-0.6, 0, 1]")
+    time.sleep(0.4)
+    assert frame(opened)["wheel"][1] > 0.05

@@ -33,7 +33,7 @@ def refused(*arguments):
         (["--authority", "papr"], "did you mean 'paper'"),
         (["--wheel", "none of that name"], "is not connected"),
         (["--torque", "0.2"], "--torque would not act without --wheel"),
-        (["--torque", "0.9", "--wheel", "any"], "0.9 is not in"),
+        (["--torque", "0.9", "--wheel", "any"], "--torque"),
         (["--port", "99999"], "--port"),
     ],
 )
@@ -48,6 +48,8 @@ def test_wrong_options_of_drive(options, said, tmp_path):
         (["--remnant", "0.1"], "--remnant would not act without --simulate"),
         (["--simulate", "population", "--code", "P01"], "--code would not act with --simulate"),
         (["--simulate", "populatin"], "did you mean 'population'"),
+        (["--simulate", "population", "--port", "9999"], "--port would not act with --simulate"),
+        (["--wheel", "any"], "the plan allows keyboard alone"),
         (["--code", "Ada Lovelace", "--no-browser"], "no name of a person"),
     ],
 )

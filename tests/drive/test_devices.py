@@ -63,7 +63,6 @@ def test_a_pedal_that_reads_0_until_it_moves_does_not_brake():
     pressed = axes.command(np.array([0.05, 0.0, -1.0, 0.0]), DT)
     assert pressed == (LIMITS.a_max, 0.0)
     assert axes.command(np.array([0.05, 0.0, 1.0, 0.0]), DT).a == 0.0
-    axes.reset()
     assert axes.command(np.array([0.05, 0.0, 0.0, -1.0]), DT).a == pytest.approx(0.5 * LIMITS.a_max - LIMITS.a_max)
 
 

@@ -20,7 +20,7 @@ except ImportError:
 
 class Joystick:
     def __init__(self, *axes, name="Made Up Wheel"):
-        self.axes, self.name, self.pumped = list(axes), name, 0
+        self.axes, self.name, self.there = list(axes), name, True
 
     def get_name(self):
         return self.name
@@ -31,8 +31,8 @@ class Joystick:
     def get_axis(self, axis_number):
         return self.axes[axis_number]
 
-    def pump(self):
-        self.pumped += 1
+    def attached(self):
+        return self.there
 
 
 class Device:
@@ -67,9 +67,11 @@ WHEEL = Calibration(
 
 def test_the_axes_are_read_at_the_tick():
     joystick = Joystick(-0.5, 1.0, 1.2)
-    readings, age = NativeWheel(joystick, joystick.pump).read(3.0)
+    readings, age = NativeWheel(joystick, joystick.attached).read(3.0)
     np.testing.assert_array_equal(readings, [-0.5, 1.0, 1.0])
-    assert (age, joystick.pumped) == (0.0, 1)
+    assert age == 0.0
+    joystick.there = False
+    assert NativeWheel(joystick, joystick.attached).read(3.0)[1] == np.inf
 
 
 def test_a_wheel_is_chosen_by_a_part_of_its_name():
@@ -93,11 +95,12 @@ def test_the_force_pulls_towards_the_automation_and_is_capped():
     assert spring.type == ecodes.FF_SPRING
     assert spring.u.ff_condition_effect[0].left_coeff == round(0.2 * FULL_FORCE)
     feedback.push(0.05)
-    assert level(device) == round(-0.1 * FULL_FORCE)  # to the left is negative for the device
+    assert device.uploaded[1].direction == 0x4000  # the kernel's left, so that a positive level pulls to the left
+    assert level(device) == round(0.1 * FULL_FORCE)
     feedback.push(5.0)
-    assert level(device) == round(-0.2 * FULL_FORCE)
-    feedback.push(-5.0)
     assert level(device) == round(0.2 * FULL_FORCE)
+    feedback.push(-5.0)
+    assert level(device) == round(-0.2 * FULL_FORCE)
     feedback.rest()
     assert level(device) == 0
     assert len(device.uploaded) == 2  # one effect is changed, not one added a tick
@@ -106,11 +109,11 @@ def test_the_force_pulls_towards_the_automation_and_is_capped():
 
 def test_the_wheel_is_pushed_by_its_difference_to_the_automation():
     device, joystick = Device(), Joystick(-0.2, 1.0, 1.0)
-    wheel = NativeWheel(joystick, joystick.pump, Feedback(device, 0.1, ff, ecodes))
+    wheel = NativeWheel(joystick, joystick.attached, Feedback(device, 0.1, ff, ecodes))
     wheel.push(0.2 * 0.5, 0.5, WHEEL)  # the automation holds the same angle
     assert level(device) == 0
-    wheel.push(0.0, 0.5, WHEEL)
-    assert level(device) > 0
+    wheel.push(0.0, 0.5, WHEEL)  # it holds less: back to the right
+    assert level(device) < 0
     wheel.rest()
     assert level(device) == 0
 
@@ -134,7 +137,7 @@ def test_it_drives_and_the_page_does_not(folder):
     joystick, device = Joystick(0.0, 1.0, 1.0), Device()
 
     def make(seat):
-        seat.native = NativeWheel(joystick, joystick.pump, Feedback(device, 0.1, ff, ecodes))
+        seat.native = NativeWheel(joystick, joystick.attached, Feedback(device, 0.1, ff, ecodes))
         return FreeDriving(seat, folder, Choice())
 
     serving = Serving(make)
@@ -161,6 +164,42 @@ def test_it_drives_and_the_page_does_not(folder):
         assert trial.header["device"] == "wheel"
         np.testing.assert_allclose(trial.columns["command"][:, 1], 0.1 * np.radians(30.0))
         assert level(device) == 0
+    serving.stop()
+
+
+def test_a_wheel_that_is_unplugged_pauses_and_forces_end_with_the_drive(folder):
+    joystick, device = Joystick(0.0, 1.0, 1.0), Device()
+
+    def make(seat):
+        seat.native = NativeWheel(joystick, joystick.attached, Feedback(device, 0.1, ff, ecodes))
+        return FreeDriving(seat, folder, Choice())
+
+    serving = Serving(make)
+    with serving.connect() as connection:
+        page = Page(connection)
+        page.start(degradation="bias_ramp", authority="none", device="wheel", calibration=WHEEL.model_dump())
+        page.say(type="begin")
+        joystick.axes = [-0.5, 1.0, 1.0]
+        page.drive(0.5)
+        assert level(device) != 0
+        joystick.there = False
+        assert "no input" in page.until("state", state="paused")["reason"]
+        assert level(device) == 0
+        joystick.there = True
+        page.say(type="resume")
+        page.drive(0.3)
+        assert level(device) != 0
+        page.say(type="leave")
+        page.until("state", state="empty")
+        assert level(device) == 0
+        joystick.axes = [0.0]
+        page.say(
+            type="start",
+            **{"scenario": "bend", "degradation": "own", "authority": "paper"},
+            device="wheel",
+            calibration=WHEEL.model_dump(),
+        )
+        assert "fewer axes" in page.until("refused")["message"]
     serving.stop()
 
 

@@ -70,6 +70,17 @@ def test_a_record_without_automation_and_one_that_is_none(tmp_path):
         read_record(tmp_path / "x.npz")
 
 
+def test_what_gives_no_delay_is_said_and_a_sign_does_not_matter(tmp_path):
+    with pytest.raises(ValueError, match="'command' is constant"):
+        study(read_record(record(tmp_path / "c.npz", command=np.full(3000, 5.0))))
+    turned = -np.load(record(tmp_path / "a.npz"))["motor_torque"]
+    found = study(read_record(record(tmp_path / "t.npz", motor_torque=turned)))
+    assert found.delay == pytest.approx(0.06, abs=0.011)
+    assert found.correlation < -0.98
+    with pytest.raises(ValueError, match="end of the search"):
+        study(read_record(record(tmp_path / "l.npz", delay=0.55)))
+
+
 def test_the_shared_record_and_its_honest_words():
     if not SHARED.exists():
         pytest.skip(f"needs {SHARED.name} in ../shared/data")
@@ -81,3 +92,5 @@ def test_the_shared_record_and_its_honest_words():
     result = CliRunner().invoke(app, ["identify", str(SHARED)], env={"COLUMNS": "200"})
     assert result.exit_code == 0
     assert "K_h and T_h are not identified from this record" in result.output
+    for option in (["--channel", "acceleration"], ["--condition", "x"], ["--out", "x"]):
+        assert CliRunner().invoke(app, ["identify", str(SHARED), *option]).exit_code == 2

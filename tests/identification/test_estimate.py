@@ -28,7 +28,9 @@ def loop(arm, n=20, T=200, remnant=0.005, rho=0.85, seed=0):
             side += DT * 15.0 * heading
             own = phi * own + arm.K_h * (1.0 - phi) * v[i, k]
     outside = np.stack([fault, np.zeros_like(fault)], axis=2)
-    return Drives("toy", tuple(f"{i}" for i in range(n)), v, y, outside, np.ones((n, T), bool), DT, "", ())
+    return Drives(
+        "toy", tuple(f"{i}" for i in range(n)), v, y, outside, np.full(n, T), np.ones((n, T), bool), DT, "", ()
+    )
 
 
 def equation_error(drives):
@@ -87,6 +89,34 @@ def test_padding_does_not_count():
     first, second = box_jenkins(drives), box_jenkins(wide)
     np.testing.assert_allclose(first.K_h, second.K_h, rtol=1e-6)
     np.testing.assert_allclose(first.T_h, second.T_h, rtol=1e-5)
+
+
+@pytest.mark.parametrize("offset", [0.01, 0.05])
+def test_a_wheel_that_does_not_stand_straight_changes_nothing(offset):
+    drives = loop(Arm(1.0, 0.2), n=20)
+    first, second = box_jenkins(drives), box_jenkins(drives._replace(y=drives.y + offset))
+    assert second.found
+    assert second.offset.value - first.offset.value == pytest.approx(offset, abs=1e-5)
+    np.testing.assert_allclose(second.K_h, first.K_h, rtol=1e-3)
+    np.testing.assert_allclose(second.T_h, first.T_h, rtol=1e-3)
+
+
+def test_an_estimate_at_the_end_of_the_search_is_no_result():
+    drives = loop(Arm(1.0, 0.2), n=8)
+    wrong = drives._replace(y=30.0 * drives.v)
+    assert not box_jenkins(wrong).found
+    assert not box_jenkins(wrong, delay=True).found
+
+
+def test_a_drive_without_a_step_that_counts_is_left_out():
+    drives = loop(Arm(1.0, 0.2), n=10)
+    counts = drives.counts.copy()
+    counts[3] = False
+    assert np.isfinite(diagnose(drives._replace(counts=counts), box_jenkins(drives))).all()
+    counts[:] = False
+    counts[:, :15] = True  # too few for a test of whiteness
+    nothing = diagnose(drives._replace(counts=counts), box_jenkins(drives))
+    assert np.isnan(nothing).all()
 
 
 def test_without_an_instrument_there_is_no_cross_check():

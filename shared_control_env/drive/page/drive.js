@@ -35,7 +35,7 @@ function receive(message) {
       else if (message.role === "spectator") show("notice", "You look on: another page drives.");
       if (message.kind === "free" && !chosen.scenario) chosen = { ...message.choice, device: message.native ? "wheel" : "keyboard" };
     },
-    road: () => world.setRoad(message),
+    road: () => { world.setRoad(message); input.choose(message.device, message.native ? welcome.native : ""); },
     frame: () => {
       world.setFrame(message, state === "driving");
       echo = message.n;
@@ -242,9 +242,9 @@ addEventListener("keydown", (event) => {
 document.addEventListener("visibilitychange", () => { if (document.hidden && state === "driving") send({ type: "pause", reason: "hidden" }); });
 
 setInterval(() => {
-  if (!["ready", "driving"].includes(state) || welcome.role !== "driver" || document.hidden) return;
-  const readings = input.readings(), now = performance.now();
-  if (readings) send({ type: "input", seq: seq++, stamp: now / 1000, echo, held: echo < 0 ? 0 : (now - echoed) / 1000, readings });
+  if (!["ready", "driving", "paused"].includes(state) || welcome.role !== "driver" || document.hidden) return;
+  const readings = input.readings(), now = performance.now(), device = input.device;
+  if (readings) send({ type: "input", seq: seq++, stamp: now / 1000, echo, held: echo < 0 ? 0 : (now - echoed) / 1000, readings, device });
 }, RATE);
 
 connect();

@@ -20,15 +20,17 @@ export class Input {
     event.preventDefault();
   }
 
-  // Raw readings of the chosen device alone; null while it is not there.
+  // Raw readings of the chosen device alone; null while it is not there. A wheel that the server reads is only shown.
   readings() {
     if (this.device === "keyboard") return [...this.keys];
-    const pad = connected();
+    if (this.native) return [0];
+    const pad = connected(this.calibration?.name);
     return pad ? axesOf(pad) : null;
   }
 
   choose(device, native) {
     this.device = device;
+    this.native = native;
     this.calibration = null;
     const name = native || connected()?.id.slice(0, 150);
     if (device !== "keyboard" && name) {
@@ -43,7 +45,8 @@ export class Input {
   }
 }
 
-export const connected = () => [...navigator.getGamepads()].find((pad) => pad && pad.connected) || null;
+// The gamepad or wheel of a name, or the first without one.
+export const connected = (name) => [...navigator.getGamepads()].find((pad) => pad && pad.connected && (!name || pad.id.slice(0, 150) === name)) || null;
 
 // Axes, then buttons as axes from 0 to 1: the pedals of some devices are buttons.
 const axesOf = (pad) => [...pad.axes, ...pad.buttons.map((button) => button.value)].slice(0, 32).map((v) => Math.max(-1, Math.min(1, v)));

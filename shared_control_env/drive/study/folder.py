@@ -63,9 +63,11 @@ class StudyFolder:
         path: folder of the study; it is made if needed.
         plan: the plan; that of an earlier run must be the same.
         code: code of the person; empty for the next free one.
+        simulated: what simulates the person; empty for a real one.
 
     Attributes:
         plan: the plan.
+        simulated: what simulates the person; empty for a real one.
         code: code of the person.
         number: number of the person in the order of enrolment, from 0.
         order: the conditions in this person's order.
@@ -76,8 +78,8 @@ class StudyFolder:
             none.
     """
 
-    def __init__(self, path: Path, plan: Plan, code: str = "") -> None:
-        self.plan, self._path = plan, path
+    def __init__(self, path: Path, plan: Plan, code: str = "", simulated: str = "") -> None:
+        self.plan, self._path, self.simulated = plan, path, simulated
         people = path / PEOPLE
         self._kept = ExitStack()
         self._kept.enter_context(locked(path))
@@ -89,9 +91,13 @@ class StudyFolder:
                 raise ValueError(f"code = {code!r} must be at most 20 letters, digits, - and _; no name of a person")
             self.recordings = RecordingsFolder(people / self.code)
             if self.code not in enrolled:
-                about = {"number": len(enrolled), "enrolled": time.strftime("%Y-%m-%d %H:%M:%S")}
-                self._write(ABOUT, about)
-            self.number = self._read(ABOUT)["number"]
+                now = time.strftime("%Y-%m-%d %H:%M:%S")
+                self._write(ABOUT, {"number": len(enrolled), "enrolled": now, "simulated": simulated})
+            about = self._read(ABOUT)
+            if about["simulated"] != simulated:
+                kinds = (kind or "a real person" for kind in (about["simulated"], simulated))
+                raise ValueError("{} is {}, not {}; two are not mixed under one code".format(self.code, *kinds))
+            self.number = about["number"]
             self.order = [plan.conditions[i] for i in order_of(self.number, len(plan.conditions), plan.seed)]
         except BaseException:
             self.close()

@@ -65,6 +65,8 @@ class Condition(Drives):
             raise ValueError(
                 f"name = {name!r} must be at most 31 letters, digits, - and _, since files are named by it"
             )
+        if name.lower() == "practice":
+            raise ValueError(f"name = {name!r} is that of the practice drives")
         return name
 
 
@@ -111,7 +113,7 @@ class Plan(Part):
 
     @model_validator(mode="after")
     def _whole(self) -> Plan:
-        names = [condition.name for condition in self.conditions]
+        names = [condition.name.lower() for condition in self.conditions]  # some file systems know no capitals
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"conditions: the name {name!r} is given twice")

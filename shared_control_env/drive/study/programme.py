@@ -20,7 +20,6 @@ class StudyProgramme:
     Args:
         seat: the seat.
         folder: folder of the study.
-        simulated: name of the simulated person; empty for a real one.
 
     Attributes:
         over: whether the person is done.
@@ -28,12 +27,14 @@ class StudyProgramme:
 
     kind = "study"
 
-    def __init__(self, seat: Seat, folder: StudyFolder, simulated: str = "") -> None:
-        self.seat, self.folder, self.simulated = seat, folder, simulated
+    def __init__(self, seat: Seat, folder: StudyFolder) -> None:
+        self.seat, self.folder = seat, folder
         self.over = asyncio.Event()
         self._told = folder.recordings.lost
         self._present: Drive | None = None
         self._step = self._next_step()
+        if self._step["step"] == "end":
+            self.over.set()
 
     def welcome(self) -> dict[str, Any]:
         """What a page needs to know at first."""
@@ -57,7 +58,7 @@ class StudyProgramme:
             case Consent() if step == "consent":
                 self.folder.agree(message.agreed)
             case Device() if step == "device":
-                allowed = ("simulated",) if self.simulated else self.folder.plan.devices
+                allowed = ("simulated",) if self.folder.simulated else self.folder.plan.devices
                 if message.device not in allowed:
                     raise ValueError(f"device = {message.device!r}; this study allows {', '.join(allowed)}")
                 check_device(message.device, message.calibration)
@@ -68,7 +69,7 @@ class StudyProgramme:
                 self.folder.recordings.mark(f"the drive {self._present.label} of {self.folder.code}")
                 self.seat.begin()
                 return
-            case Simple(type="begin") if step == "next" and isinstance(upcoming, Drive):
+            case Simple(type="begin") if step == "next" and isinstance(upcoming, Drive) and self._present is None:
                 await self._prepare(upcoming)
                 return
             case Simple(type="begin") if step == "device":
@@ -90,11 +91,24 @@ class StudyProgramme:
         self._present = drive
         try:
             await self.seat.prepare(
-                drive.what.choice(drive.seed), device["device"], calibration, drive.what.show, self._finished
+                drive.what.choice(drive.seed),
+                device["device"],
+                calibration,
+                drive.what.show,
+                self._finished,
+                self._give_up,
             )
         except BaseException:
             self._present = None
+            self.seat.send(self._step)
             raise
+
+    async def _give_up(self) -> None:
+        """Go back to the step before a drive that failed."""
+        self.folder.recordings.unmark()
+        self._present = None
+        await self.seat.clear()
+        self._go_on()
 
     async def _finished(self, session: Session) -> None:
         """Write the recording, then go on."""
@@ -108,7 +122,7 @@ class StudyProgramme:
                 "code": self.folder.code,
                 "condition": "practice" if drive.condition is None else drive.condition.name,
                 "result": result,
-                "simulated": self.simulated,
+                "simulated": self.folder.simulated,
             }
         )
         await asyncio.to_thread(self.folder.add, drive, trial)
@@ -138,7 +152,7 @@ class StudyProgramme:
                 "text": "Nothing is recorded. You can close this page.",
             }
         if folder.device is None:
-            devices = ["simulated"] if self.simulated else list(plan.devices)
+            devices = ["simulated"] if self.folder.simulated else list(plan.devices)
             text = "Choose what you drive with. A gamepad or a wheel is calibrated first."
             return {**base, "step": "device", "title": "Your device", "text": text, "devices": devices}
         upcoming = folder.next()

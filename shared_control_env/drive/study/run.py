@@ -37,6 +37,8 @@ def with_person(
         wheel, torque: a wheel on this machine and its force feedback, as for driving freely.
         console: prints.
     """
+    if wheel and "wheel" not in plan.devices:
+        raise ValueError(f"wheel = {wheel!r}: the plan allows {', '.join(plan.devices)} alone (devices)")
     native = open_wheel(wheel, torque) if wheel else None
     folder = StudyFolder(out, plan, code)
     try:
@@ -47,7 +49,7 @@ def with_person(
         console.print(f"Person {folder.code}, in {out}. Ctrl+C stops; the same command goes on.", markup=False)
         announce(server, port, console)
         server.run(browser, until=_ended(server))
-        done = folder.next() is None
+        done = folder.consent is False or folder.next() is None
         folder.recordings.unmark()
     finally:
         folder.close()
@@ -76,7 +78,8 @@ def with_simulated(
         task = bar.add_task("people", total=people)
         for i in range(people):
             name = drivers[i % len(drivers)]
-            folder = StudyFolder(out, plan, f"S{i + 1:02d}")
+            noise = f" with a remnant of {remnant.steering:g} rad" if remnant.steering else ""
+            folder = StudyFolder(out, plan, f"S{i + 1:02d}", f"{name}{noise}")
             try:
                 if folder.consent is None or folder.next() is not None:
                     asyncio.run(_simulate(folder, SimulatedPerson(name, i, remnant)))
@@ -88,7 +91,7 @@ def with_simulated(
 
 async def _simulate(folder: StudyFolder, person: SimulatedPerson) -> None:
     """Let a simulated person take part, in step with the server."""
-    server = Server(lambda seat: StudyProgramme(seat, folder, person.name), in_step=True, port=0)
+    server = Server(lambda seat: StudyProgramme(seat, folder), in_step=True, port=0)
     server.seat.with_scene = True
     serving = asyncio.create_task(server.serve())
     try:

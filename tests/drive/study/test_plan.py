@@ -58,6 +58,8 @@ def test_a_plan_is_read(tmp_path):
         ('devices = ["keyboard"]', "devices = []", "devices"),
         ('name = "unlimited"', 'name = "fuzzy"', "'fuzzy' is given twice"),
         ('name = "unlimited"', 'name = "../up"', "letters, digits"),
+        ('name = "unlimited"', 'name = "Fuzzy"', "'fuzzy' is given twice"),
+        ('name = "unlimited"', 'name = "practice"', "is that of the practice drives"),
         (
             'authority = "none"',
             'authority = "nonne"',

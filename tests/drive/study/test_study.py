@@ -1,6 +1,5 @@
 """A whole study: simulated people through the page's connection, interruption, resumption and export."""
 
-import asyncio
 import json
 
 import numpy as np
@@ -78,7 +77,7 @@ def test_stopped_at_any_moment_it_goes_on(plan, tmp_path, monkeypatch):
     async def one_step(folder, person):
         nonlocal stops
         stops += 1
-        programme = StudyProgramme(_Seat(), folder, person.name)
+        programme = StudyProgramme(_Seat(), folder)
         step = programme._step
         if step["step"] == "consent":
             folder.agree(True)
@@ -92,7 +91,7 @@ def test_stopped_at_any_moment_it_goes_on(plan, tmp_path, monkeypatch):
     monkeypatch.setattr(study_run, "_simulate", one_step)
     for _ in range(40):
         simulate(plan, out)
-        folder = StudyFolder(out, plan, "S01")
+        folder = StudyFolder(out, plan, "S01", "hands_on")
         upcoming = folder.next() if folder.device else True
         folder.close()
         if upcoming is None:
@@ -135,6 +134,75 @@ async def _drive(programme, person):
 
     programme.seat.clear = clear
     await programme._finished(session)
+
+
+def test_other_people_are_not_mixed_in(plan, tmp_path):
+    out = tmp_path / "study"
+    simulate(plan, out)
+    with pytest.raises(ValueError, match="S01 is hands_on, not mpc_1"):
+        simulate(plan, out, names="mpc_1")
+    with pytest.raises(ValueError, match=r"not hands_on with a remnant of 0\.01 rad"):
+        study_run.with_simulated(plan, out, "hands_on", 1, Remnant(steering=0.01), QUIET)
+    with pytest.raises(ValueError, match="not a real person"):
+        StudyFolder(out, plan, "S01")
+
+
+def test_a_second_begin_while_driving_is_refused(plan, tmp_path):
+    folder = StudyFolder(tmp_path / "study", plan)
+    folder.agree(True)
+    folder.choose_device({"device": "keyboard", "calibration": None})
+    serving = Serving(lambda seat: StudyProgramme(seat, folder))
+    with serving.connect() as connection:
+        page = Page(connection)
+        page.until("step", step="next")
+        page.say(type="begin")
+        assert page.until("road")["device"] == "keyboard"
+        page.until("state", state="ready")
+        page.say(type="begin")
+        page.drive(0.3)
+        page.say(type="begin")
+        got = page.drive(0.3)
+        assert [message["message"] for message in got if message["type"] == "refused"]
+        assert page.frame["k"] > 8
+    serving.stop()
+    folder.close()
+
+
+def test_a_drive_that_fails_comes_again(plan, tmp_path, monkeypatch):
+    folder = StudyFolder(tmp_path / "study", plan)
+    folder.agree(True)
+    folder.choose_device({"device": "keyboard", "calibration": None})
+    serving = Serving(lambda seat: StudyProgramme(seat, folder))
+    with serving.connect() as connection:
+        page = Page(connection)
+        title = page.until("step", step="next")["title"]
+        page.say(type="begin")
+        page.until("state", state="ready")
+        page.say(type="begin")
+        page.drive(0.3)
+        monkeypatch.setattr(serving.server.seat.drive, "step", None)
+        page.until("refused")
+        assert page.until("step", step="next")["title"] == title
+        page.say(type="begin")
+        page.until("state", state="ready")
+    serving.stop()
+    folder.close()
+
+
+def test_simulated_people_do_not_wait_for_a_disk_that_is_full(plan, tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(StudyFolder, "add", full)
+    with pytest.raises(RuntimeError, match="No space left"):
+        simulate(plan, tmp_path / "study")
+
+
+def test_who_is_done_is_not_kept_waiting(plan, tmp_path):
+    folder = StudyFolder(tmp_path / "study", plan)
+    folder.agree(False)
+    assert StudyProgramme(_Seat(), folder).over.is_set()
+    folder.close()
 
 
 def test_another_plan_is_not_mixed_in(plan, tmp_path):
@@ -263,16 +331,3 @@ def test_a_person_on_the_page(plan, tmp_path):
     assert header["code"] == "P01"
     folder.close()
     assert not isinstance(folder.next(), Questions)
-
-
-def test_the_event_that_ends_the_command(plan, tmp_path):
-    folder = StudyFolder(tmp_path / "study", plan)
-
-    async def check():
-        programme = StudyProgramme(_Seat(), folder)
-        folder.agree(False)
-        programme._go_on()
-        assert programme.over.is_set()
-
-    asyncio.run(check())
-    folder.close()

@@ -31,6 +31,7 @@ from shared_control_env.core.records import (
 )
 from shared_control_env.core.risk.finding import Finding
 from shared_control_env.core.world.motion import Motion
+from shared_control_env.core.world.road import COLUMNS
 
 
 class Batch(NamedTuple):
@@ -46,7 +47,7 @@ class Batch(NamedTuple):
             kernel has no driver.
         transitions: records of :data:`records.TRANSITION`, shape (N,).
         states: ego ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (N, 6).
-        lines: reference lines of the roads, see :mod:`core.world.road`, shape (N, n, 6).
+        lines: reference lines of the roads, see :mod:`core.world.road`, shape (N, n, 12).
         faults: records of :class:`core.parameters.DegradationParameters`, shape (N, m).
         fault_memories: records of :data:`records.FAULT_MEMORY`, shape (N, m).
         traffic: other vehicles, columns as in :mod:`core.records`, shape (N, M, 8).
@@ -82,7 +83,7 @@ class Environment(NamedTuple):
         person: what a person at the wheel carries from step to step.
         transition: what the reward needs from before and after the last step.
         state: ego ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (6,).
-        line: reference line of the road, shape (n, 6).
+        line: reference line of the road, shape (n, 12).
         faults: records of :class:`core.parameters.DegradationParameters`, shape (m,).
         fault_memories: records of :data:`records.FAULT_MEMORY`, shape (m,).
         traffic: other vehicles, columns as in :mod:`core.records`, shape (M, 8).
@@ -259,7 +260,7 @@ def empty_starts(n: int, sizes: Sizes) -> Starts:
     return Starts(
         parameters=np.zeros(n, record_dtype(Parameters)),
         states=np.zeros((n, 6)),
-        lines=np.zeros((n, sizes.rows, 6)),
+        lines=np.zeros((n, sizes.rows, COLUMNS)),
         faults=np.zeros((n, sizes.faults), record_dtype(DegradationParameters)),
         traffic=np.zeros((n, sizes.vehicles, 8)),
         plans=np.zeros((n, sizes.vehicles), record_dtype(TrafficParameters)),

@@ -14,7 +14,7 @@ from shared_control_env.core.authority import allocators
 from shared_control_env.core.authority.allocators import Situation
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.control import automation, driver, driver_lag, person
-from shared_control_env.core.world import actuator, vehicle
+from shared_control_env.core.world import actuator, replay, vehicle
 from shared_control_env.core.world import traffic as traffic_model
 
 Boxed: TypeAlias = Any
@@ -50,7 +50,6 @@ def decide_acceleration(
     ego: np.ndarray,
     traffic: np.ndarray,
     line: np.ndarray,
-    lane_width: float,
 ) -> None:
     """Decide the acceleration of one other vehicle, see :func:`world.traffic.decide_acceleration`.
 
@@ -60,10 +59,47 @@ def decide_acceleration(
         t: time [s].
         ego: the ego as a row of the traffic array, shape (8,).
         traffic: all other vehicles, shape (n, 8).
-        line: reference line, shape (m, 6).
-        lane_width: width of a lane [m].
+        line: reference line, shape (m, 12).
     """
-    traffic_model.decide_acceleration(row, plan[()], t, ego, traffic, line, lane_width)
+    traffic_model.decide_acceleration(row, plan[()], t, ego, traffic, line)
+
+
+@jit
+def decide(
+    me: int,
+    plans: np.ndarray,
+    traffic: np.ndarray,
+    ego: np.ndarray,
+    step: int,
+    dt: float,
+    line: np.ndarray,
+    work: np.ndarray,
+) -> None:
+    """Decide how a vehicle with a recorded track moves, see :func:`world.replay.decide`.
+
+    Args:
+        me: index of the vehicle.
+        plans: records of :class:`core.parameters.TrafficParameters`, shape (n,).
+        traffic: all vehicles but the ego, shape (n, 8).
+        ego: the ego as a row of the traffic array, shape (8,).
+        step: simulation step.
+        dt: simulation step [s].
+        line: reference line, shape (m, 12).
+        work: scratch, shape (3, 8).
+    """
+    replay.decide(me, plans, traffic, ego, step, dt, line, work)
+
+
+@jit
+def advance(
+    me: int, plans: np.ndarray, traffic: np.ndarray, ego: np.ndarray, step: int, dt: float, line: np.ndarray
+) -> None:
+    """Move a vehicle with a recorded track, see :func:`world.replay.advance`.
+
+    Args:
+        me, plans, traffic, ego, step, dt, line: as for :func:`decide`.
+    """
+    replay.advance(me, plans, traffic, ego, step, dt, line)
 
 
 @jit
@@ -73,7 +109,7 @@ def move_along(row: np.ndarray, plan: Boxed, line: np.ndarray, t: float, dt: flo
     Args:
         row: the vehicle's row of the traffic array, overwritten, shape (8,).
         plan: :class:`core.parameters.TrafficParameters` of the vehicle, a 0-d array.
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         t: time [s].
         dt: step [s].
     """

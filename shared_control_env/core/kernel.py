@@ -169,7 +169,7 @@ def write_outputs(i: int, resetting: bool, e: Environment, setup: Setup, out: Ou
     """
     if resetting:
         note(i, e, out)
-        e.transition.on_road = is_on_road(e.scene, e.p)
+        e.transition.on_road = is_on_road(e.scene)
         out.rewards[i] = 0.0
         out.terminations[i] = out.truncations[i] = False
     else:

@@ -229,34 +229,32 @@ def evaluate(e: Environment, steps: int) -> tuple[float, bool, bool]:
         whether the episode is truncated (its duration has passed, or the road ends).
     """
     transition, x = e.transition, e.scene.state
-    transition.on_road = is_on_road(e.scene, e.p) and np.isfinite(x[0] + x[1] + x[2] + x[3] + x[4] + x[5])
+    transition.on_road = is_on_road(e.scene) and np.isfinite(x[0] + x[1] + x[2] + x[3] + x[4] + x[5])
     transition.failed = transition.crashed or not transition.on_road
     value = reward(transition, e.scene, e.signals, e.p)
-    count_departures(e.scene, e.p, e.memory)
+    count_departures(e.scene, e.memory)
     return value, transition.failed, e.scene.k >= steps or e.scene.z[0] >= e.p.task.road_end
 
 
 @jit
-def is_on_road(scene: Scene, p: Parameters) -> bool:
+def is_on_road(scene: Scene) -> bool:
     """Whether the ego's centre lies between the edges of the road.
 
     Args:
         scene: record of :data:`records.SCENE`.
-        p: parameters.
     """
-    return -0.5 * p.task.lane_width <= scene.z[1] <= p.task.road_high
+    return scene.road_low <= scene.z[1] <= scene.road_high
 
 
 @jit_inlined
-def count_departures(scene: Scene, p: Parameters, memory: Memory) -> None:
+def count_departures(scene: Scene, memory: Memory) -> None:
     """Count how often the ego's centre has left the lane to keep.
 
     Args:
         scene: record of :data:`records.SCENE`.
-        p: parameters.
         memory: record of :data:`records.MEMORY`; ``in_lane`` and ``lane_departures`` are written.
     """
-    in_lane = abs(scene.z[1] - scene.y_target) <= 0.5 * p.task.lane_width
+    in_lane = abs(scene.z[1] - scene.y_target) <= 0.5 * scene.lane_width
     if memory.in_lane and not in_lane:
         memory.lane_departures += 1
     memory.in_lane = in_lane

@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from annotated_types import Interval
 
-from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, MAX_TERMS
+from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, MAX_TERMS, Int32
 
 FASTEST = 60.0
 """Highest speed that can be set [m/s]: 1.5 times the speed up to which the model is valid."""
@@ -374,8 +374,6 @@ class TaskParameters(NamedTuple):
     Attributes:
         dt: time step of all controllers [s]; paper, Section VI (0.05 s).
         tau_p: horizon of the CTRA prediction [s]; paper, Section III-A.
-        lane_width: width of a lane [m]; specification of the cases (4 m).
-        road_high: left edge of the road in the road frame [m].
         road_end: path length at which the road and the episode end [m].
         y_target: lateral position of the lane to keep [m].
         target_speed: desired speed where no slower vehicle precedes [m/s]; Case 1 (15 m/s).
@@ -390,8 +388,6 @@ class TaskParameters(NamedTuple):
 
     dt: Positive = 0.05
     tau_p: Annotated[float, Interval(ge=1e-3, le=10.0)] = 0.5
-    lane_width: Positive = 4.0
-    road_high: float = 6.0
     road_end: Positive = math.inf
     y_target: float = 0.0
     target_speed: TargetSpeed = 15.0
@@ -444,7 +440,7 @@ class DegradationParameters(NamedTuple):
     frequency: Positive = 0.5
     seed: int = 0
     profile: int = 0
-    profile_steps: int = 0
+    profile_steps: Int32 = 0
 
 
 class TrafficParameters(NamedTuple):
@@ -458,6 +454,12 @@ class TrafficParameters(NamedTuple):
         change_onset: time at which the vehicle begins a lane change [s]; infinite for never.
         change_duration: duration of the lane change [s].
         shift: lateral displacement of the lane change, positive to the left [m].
+        track: address of a recorded track, rows X to YAW_RATE at the simulation steps; 0 for none. A vehicle with a
+            track replays it until ``follows`` is set, which the core does once the ego makes the record impossible.
+        ego_track: address of the track of the vehicle whose place the ego has taken; 0 for none.
+        steps: number of rows of the track.
+        first: first simulation step at which the vehicle is there.
+        last: last simulation step at which it is there.
     """
 
     follows: bool = False
@@ -467,6 +469,11 @@ class TrafficParameters(NamedTuple):
     change_onset: NonNegative = math.inf
     change_duration: Positive = 3.0
     shift: float = 0.0
+    track: int = 0
+    ego_track: int = 0
+    steps: Int32 = 0
+    first: Int32 = 0
+    last: Int32 = 0
 
 
 class AuthorityParameters(NamedTuple):

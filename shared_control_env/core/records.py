@@ -117,6 +117,8 @@ class Scene:
         neighbours: rows of the follower, the leader and the preceding vehicle, columns PRESENT to NEAR_ROW.
         bodies: half the sum of the lengths of the ego and of the preceding vehicle [m]: the distance between their
             centres minus their gap.
+        lane_width: width of the lane at the ego [m].
+        road_low, road_high: offsets of the road's right and left edge at the ego [m].
         region: driving region [start, end, low, high] in the road frame [m].
         area: the safe area C.
     """
@@ -135,6 +137,9 @@ class Scene:
     displayed: float
     neighbours: Annotated[np.ndarray, (3, 5)]
     bodies: float
+    lane_width: float
+    road_low: float
+    road_high: float
     region: Annotated[np.ndarray, (4,)]
     area: SafeArea
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, SPEED, YAW_RATE, X, Y
-from shared_control_env.core.world.road import point_at
+from shared_control_env.core.world.replay import AWAY
+from shared_control_env.core.world.road import RIGHT, point_at
 from shared_control_env.drive.session import Drive
 from shared_control_env.envs.settings.checks import LEAD_IN
 
@@ -39,6 +40,7 @@ def road_of(drive: Drive) -> dict[str, Any]:
         "line": np.round(line, 4).tolist(),
         "start": -LEAD_IN,
         "spacing": SPACING,
+        "low": float(env.line[0, RIGHT]),
         "lanes": settings.road.lanes,
         "lane_width": settings.road.lane_width,
         "body": [settings.vehicle.length, settings.vehicle.width],
@@ -67,7 +69,9 @@ def frame_of(drive: Drive, shown: tuple[str, ...]) -> dict[str, Any]:
         "y_target": round(float(scene["y_target"]), 2),
         "v_target": round(float(scene["v_target"]), 2),
         "others": [
-            _rounded(row[[X, Y, HEADING, SPEED, YAW_RATE, BODY_LENGTH, BODY_WIDTH]].tolist()) for row in env.traffic
+            _rounded(row[[X, Y, HEADING, SPEED, YAW_RATE, BODY_LENGTH, BODY_WIDTH]].tolist())
+            for row in env.traffic
+            if row[X] != AWAY
         ],
         "wheel": _rounded(info["u_h_act"][0].tolist()),
         "crashed": bool(info["crashed"][0]),

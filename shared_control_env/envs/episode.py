@@ -9,10 +9,14 @@ import numpy as np
 
 from shared_control_env.core.faults.kinds import KINDS
 from shared_control_env.core.parameters import PERSONS, Limits, PersonParameters
+from shared_control_env.core.records import SPEED
+from shared_control_env.core.world.road import WIDTH
 from shared_control_env.envs.degradations import draw_degradation
+from shared_control_env.envs.recorded.replay import files_in, replay_of, usable
 from shared_control_env.envs.settings import CUT_OFF, RandomSettings, Settings, check, plain
 from shared_control_env.envs.settings.changes import at
 from shared_control_env.envs.settings.checks import RESTING
+from shared_control_env.envs.starts import steps_of
 
 
 def is_random(settings: Settings) -> bool:
@@ -23,16 +27,18 @@ def is_random(settings: Settings) -> bool:
     """
     noisy = any(KINDS[fault.kind].draws and fault.seed is None for fault in settings.faults)
     person = settings.has_person and settings.person.seed is None
-    return bool(settings.randomise or settings.degradations or settings.persons or noisy or person)
+    return bool(
+        settings.recording or settings.randomise or settings.degradations or settings.persons or noisy or person
+    )
 
 
 def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
     """Draw the settings of one episode.
 
-    The draws are one of ``persons``, the entries of ``randomise`` in their order, one of ``degradations``, the seeds of
-    noise, and the seed of the person. If a person drives, the person, the settings that concern the driver and the seed
-    of the person come from a separate generator. A seed then gives the same road, traffic and degradations for every
-    driver.
+    The draws are a recording and its ego, one of ``persons``, the entries of ``randomise`` in their order, one of
+    ``degradations``, the seeds of noise, and the seed of the person. If a person drives, the person, the settings that
+    concern the driver and the seed of the person come from a separate generator. A seed then gives the same road,
+    traffic and degradations for every driver.
 
     Args:
         settings: settings of the environment.
@@ -47,6 +53,8 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
     if not is_random(settings):
         return settings
     config = plain(settings)
+    if settings.recording is not None:
+        _draw_recording(config, settings, rng)
     own = rng.spawn(1)[0] if settings.has_person else rng
     if settings.persons:
         person = PERSONS[settings.persons[int(own.integers(len(settings.persons)))]]
@@ -70,6 +78,27 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
     config["faults"] += drawn
     config["randomise"], config["degradations"] = [], []
     return check(config)
+
+
+def _draw_recording(config: dict[str, Any], settings: Settings, rng: np.random.Generator) -> None:
+    """Draw a recording and its ego, and fill in road, start and body."""
+    assert settings.recording is not None
+    files = files_in(settings.recording.file)
+    file = files[int(rng.integers(len(files)))]
+    names = usable(file, settings.duration)
+    which = int(rng.integers(max(len(names), 1)))  # drawn for a given ego too, so that later draws do not depend on it
+    ego = names[which] if settings.recording.ego is None else settings.recording.ego
+    config["recording"] = {"file": str(file), "ego": ego, "drawn": True}
+    replay = replay_of(file, ego, 1.0 / settings.simulation_frequency, steps_of(settings))
+    width = float(np.median(replay.line[:, WIDTH]))
+    config["road"] = {
+        "segments": [{"length": replay.road_end, "curvature": 0.0}],
+        "lanes": replay.lanes,
+        "lane_width": width,
+    }
+    config["ego"] = {"lane": 0, "speed": float(replay.ego[SPEED]), "lateral_offset": 0.0}
+    if replay.body is not None:
+        config["vehicle"]["length"], config["vehicle"]["width"] = replay.body
 
 
 def _concerns_driver(entry: RandomSettings) -> bool:

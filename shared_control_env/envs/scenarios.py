@@ -318,6 +318,18 @@ MOTORWAY = Scenario(
     },
 )
 
+RECORDED = Scenario(
+    id="SharedControl/Recorded-v1",
+    description="recorded traffic: the ego takes the place of a vehicle of a recording",
+    settings={
+        **ON_THE_ROAD,
+        "recording": {"file": "example", "ego": None, "drawn": False},
+        "duration": 8.0,
+        "screen_height": 632,
+    },
+)
+"""Traffic of a file, see :mod:`envs.recorded`; by default the small one that comes with the package."""
+
 SCENARIOS: dict[str, Scenario] = {
     "two_lane": TWO_LANE,
     "curve": CURVE,
@@ -331,6 +343,7 @@ SCENARIOS: dict[str, Scenario] = {
     "curve_with_lead": CURVE_WITH_LEAD,
     "wet_road": WET_ROAD,
     "motorway": MOTORWAY,
+    "recorded": RECORDED,
 }
 """All scenarios by the name that the benchmark and the entry points use."""
 

@@ -39,7 +39,7 @@ from shared_control_env.envs.highway.road import LineRoad
 from shared_control_env.envs.highway.vehicles import EgoVehicle, LaneFollower, vehicle_class, write_row
 from shared_control_env.envs.highway.viewer import SharedControlViewer
 from shared_control_env.envs.seeds import checked_seed
-from shared_control_env.envs.starts import refresh_addresses, start_of, write_start
+from shared_control_env.envs.starts import count_vehicles, has_left, refresh_addresses, start_of, write_start
 
 
 class SharedControlEnv(HighwayEnv):
@@ -250,12 +250,13 @@ class SharedControlEnv(HighwayEnv):
         ego = EgoVehicle(self.road, batch.states[0], self.episode.task.target_speed, self.parameters)
         self.controlled_vehicles = [ego]
         self.road.vehicles = [ego]
-        for (x, y, heading, speed), plan in zip(
-            batch.traffic[0][:, [X, Y, HEADING, SPEED]], batch.plans[0], strict=True
-        ):
-            vehicle = self._vehicle_class(self.road, (x, y), heading=float(heading), speed=float(speed))
+        for row, plan in zip(batch.traffic[0], batch.plans[0], strict=True):
+            x, y, heading, speed = row[[X, Y, HEADING, SPEED]].tolist()
+            vehicle = self._vehicle_class(self.road, (x, y), heading=heading, speed=speed)
             if isinstance(vehicle, LaneFollower):
                 vehicle.plan[()] = plan
+                if plan["track"]:
+                    vehicle.take(row)
             self.road.vehicles.append(vehicle)
 
     def _bind(self) -> None:
@@ -281,6 +282,7 @@ class SharedControlEnv(HighwayEnv):
         self._foreign = [
             (vehicle, row) for vehicle, row in zip(others, traffic[0], strict=True) if type(vehicle) is not LaneFollower
         ]
+        self.road.plans, self.road.dt = plans[0], 1.0 / self.episode.simulation_frequency
         self._corners = np.zeros((len(others), 4, 2))
         self.road.rows = np.zeros((0, 8))
         self._bound = [ego, *self.road.vehicles]
@@ -449,7 +451,7 @@ class SharedControlEnv(HighwayEnv):
 
     @property
     def line(self) -> np.ndarray:
-        """Reference line of the road, shape (n, 6)."""
+        """Reference line of the road, shape (n, 12)."""
         return self._batch.lines[0]
 
     @property
@@ -461,6 +463,16 @@ class SharedControlEnv(HighwayEnv):
     def traffic(self) -> np.ndarray:
         """The other vehicles, one per row, columns as in :mod:`core.records`, shape (n, 8)."""
         return self._batch.traffic[0]
+
+    @property
+    def handed_over(self) -> np.ndarray:
+        """Whether each recorded vehicle has left its track because of the ego, in the order of the recording.
+
+        The ego is left out. The array is as long as for the recording with the most vehicles, shape (n,).
+        """
+        left = np.zeros(count_vehicles(self.settings), dtype=bool)
+        left[: len(self._batch.plans[0])] = has_left(self._batch.plans[0])
+        return left
 
     def _reward(self, action: Any) -> float:
         """Reward of the last step: the sum of the weighted terms of :mod:`core.feedback.reward`."""
@@ -484,6 +496,8 @@ class SharedControlEnv(HighwayEnv):
         highway-env's info also contains the action, which is an unseeded sample at a reset. It is left out here.
         """
         info = as_dict(self.noted, self._terms)
+        if self.episode.recording is not None:
+            info["handed_over"] = self.handed_over
         if type(self)._rewards is not SharedControlEnv._rewards:
             info["rewards"] = self._rewards(action)
         return info

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +14,15 @@ from shared_control_env.core.records import (
     BODY_LENGTH,
     BODY_WIDTH,
     SPEED,
+    X,
+    Y,
     pack,
 )
+from shared_control_env.core.world.replay import AWAY
 from shared_control_env.core.world.road import S0, curvature_at, point_at, reference_line
 from shared_control_env.core.world.traffic import follow_lane
+from shared_control_env.envs.recorded.replay import Replay, files_in, read, replay_of
+from shared_control_env.envs.recorded.road import most_rows
 from shared_control_env.envs.settings import LEAD_IN, Settings, fault_records, parameters_of, plan_records
 
 
@@ -24,7 +30,7 @@ class Start(NamedTuple):
     """The start of one episode.
 
     Attributes:
-        line: reference line of the road, shape (n, 6).
+        line: reference line of the road, shape (n, 12).
         faults: degradations as records of :class:`core.parameters.DegradationParameters`, shape (m,).
         parameters: record of :class:`core.parameters.Parameters`.
         ego: state of the ego, [x, y, psi, v_x, v_y, r] [m, rad, m/s, rad/s], shape (6,).
@@ -46,7 +52,18 @@ def start_of(settings: Settings) -> Start:
     Args:
         settings: settings of one episode, after all random draws.
     """
-    line = reference_line([(s.length, s.curvature) for s in settings.road.segments], lead_in=LEAD_IN)
+    if settings.recording is not None:
+        replay = recorded(settings)
+        return Start(
+            replay.line,
+            fault_records(settings),
+            pack(parameters_of(settings)),
+            replay.ego,
+            replay.traffic,
+            replay.plans,
+        )
+    road = settings.road
+    line = reference_line([(s.length, s.curvature) for s in road.segments], LEAD_IN, road.lane_width, road.lanes)
     d = settings.lane_centre(settings.ego.lane) + settings.ego.lateral_offset
     x, y, psi = point_at(line, 0.0, d)
     speed = settings.ego.speed
@@ -59,6 +76,47 @@ def start_of(settings: Settings) -> Start:
     return Start(line, fault_records(settings), pack(parameters_of(settings)), ego, traffic, plan_records(settings))
 
 
+def steps_of(settings: Settings) -> int:
+    """Number of simulation steps of an episode.
+
+    Args:
+        settings: settings of the environment.
+    """
+    return settings.steps * (settings.simulation_frequency // settings.policy_frequency)
+
+
+def recorded(settings: Settings) -> Replay:
+    """The replay of an episode with recorded traffic.
+
+    Args:
+        settings: settings of one episode, after all random draws.
+    """
+    assert settings.recording is not None
+    assert settings.recording.ego is not None
+    dt = 1.0 / settings.simulation_frequency
+    return replay_of(Path(settings.recording.file), settings.recording.ego, dt, steps_of(settings))
+
+
+def count_vehicles(settings: Settings) -> int:
+    """Largest number of other vehicles of an episode.
+
+    Args:
+        settings: settings of the environment.
+    """
+    if settings.recording is None:
+        return len(settings.vehicles)
+    return max(len(read(file).tracks) for file in files_in(settings.recording.file))
+
+
+def has_left(plans: np.ndarray) -> np.ndarray:
+    """Whether vehicles with a recorded track have left it.
+
+    Args:
+        plans: records of :class:`core.parameters.TrafficParameters`.
+    """
+    return plans["follows"] & (plans["track"] != 0)
+
+
 def sizes_for(templates: Sequence[Settings]) -> Sizes:
     """Sizes that suffice for every episode that can be drawn from the settings.
 
@@ -67,7 +125,7 @@ def sizes_for(templates: Sequence[Settings]) -> Sizes:
     """
     different = list({id(template): template for template in templates}.values())
     faults = max(len(template.faults) + (1 if template.degradations else 0) for template in different)
-    return Sizes(faults, max(_most_rows(template) for template in different), len(different[0].vehicles))
+    return Sizes(faults, max(map(_most_rows, different)), max(map(count_vehicles, different)))
 
 
 def _most_rows(settings: Settings) -> int:
@@ -75,6 +133,8 @@ def _most_rows(settings: Settings) -> int:
 
     The whole road turns by at most 2 pi, and an arc is split into pieces of at most pi / 2.
     """
+    if settings.recording is not None:
+        return max(most_rows(read(file)) for file in files_in(settings.recording.file))
     if any(entry.setting.startswith("road") for entry in settings.randomise):
         return 1 + len(settings.road.segments) + 4
     return len(start_of(settings).line)
@@ -117,7 +177,10 @@ def write_start(start: Start, starts: Starts | Batch, i: int) -> None:
     starts.lines[i, : len(start.line)] = start.line
     starts.faults[i] = np.zeros((), starts.faults.dtype)
     starts.faults[i, : len(start.faults)] = start.faults
-    starts.traffic[i], starts.plans[i] = start.traffic, start.plans
+    n = len(start.traffic)  # the rows that are left over are away
+    starts.traffic[i, n:], starts.plans[i, n:] = 0.0, np.zeros((), starts.plans.dtype)
+    starts.traffic[i, n:, [X, Y]] = AWAY
+    starts.traffic[i, :n], starts.plans[i, :n] = start.traffic, start.plans
 
 
 def refresh_addresses(episodes: Sequence[Settings], starts: Starts | Batch) -> None:
@@ -139,3 +202,7 @@ def refresh_addresses(episodes: Sequence[Settings], starts: Starts | Batch) -> N
         starts.parameters["reward"]["addresses"][i] = fresh.reward.addresses
         for name in ("act", "perceive", "advance", "profile", "profile_steps"):
             starts.faults[name][i, : len(faults)] = faults[name]
+        if episode.recording is not None and episode.recording.drawn:
+            plans = recorded(episode).plans
+            for name in ("track", "ego_track"):
+                starts.plans[name][i, : len(plans)] = plans[name]

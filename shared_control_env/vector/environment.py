@@ -38,7 +38,7 @@ from shared_control_env.envs.episode import draw_episode, is_random
 from shared_control_env.envs.scenarios import ENTRY, SCENARIOS, Scenario
 from shared_control_env.envs.settings import Settings
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, NOT_DIRECT, SLOT_SPACES, observation_space, space_of
-from shared_control_env.envs.starts import enlarged, refresh_addresses, sizes_for, start_of, write_start
+from shared_control_env.envs.starts import enlarged, has_left, refresh_addresses, sizes_for, start_of, write_start
 from shared_control_env.vector.checks import (
     Actions,
     OpenSlots,
@@ -332,7 +332,8 @@ class SharedControlVectorEnv(VectorEnv):
         if finals is not None:
             ended = finals.terminations | finals.truncations
             infos["final_obs"], infos["_final_obs"] = finals.observations, ended
-            infos["final_info"], infos["_final_info"] = self._infos(finals.infos, finals.drivers, ended), ended
+            infos["final_info"] = self._infos(finals.infos, finals.drivers, ended, self._left)
+            infos["_final_info"] = ended
         return out.observations, out.rewards, out.terminations, out.truncations, infos
 
     def rollout(self, steps: int) -> Rollout:
@@ -477,7 +478,7 @@ class SharedControlVectorEnv(VectorEnv):
         if next_step:
             self._draw(self._batch.ended)
         result = self._move(steps, self._everyone, next_step, actions, out)
-        ended = result.ends[-1]
+        ended, self._left = result.ends[-1], has_left(self._batch.plans)
         if self._mode is not AutoresetMode.SAME_STEP or not ended.any():
             return result, None
         finals = self._outputs()
@@ -532,9 +533,14 @@ class SharedControlVectorEnv(VectorEnv):
         """New arrays for one step."""
         return new_outputs(self.num_envs, self._observation.size, allocate)
 
-    def _infos(self, infos: np.ndarray, drivers: np.ndarray, mask: np.ndarray) -> dict[str, Any]:
-        """Convert records to Gymnasium's nested dict of arrays and masks."""
+    def _infos(
+        self, infos: np.ndarray, drivers: np.ndarray, mask: np.ndarray, left: np.ndarray | None = None
+    ) -> dict[str, Any]:
+        """Convert records to nested dicts of arrays and masks; left: vehicles that have left their tracks."""
         values = as_batch(infos, mask, self._settings.terms)
+        if self._settings.recording is not None:
+            values["handed_over"] = has_left(self._batch.plans) if left is None else left
+            values["_handed_over"] = mask
         if self._driver:
             values["driver"], values["_driver"] = as_batch(drivers, mask), mask
         return values

@@ -110,7 +110,7 @@ def test_how_a_step_ends(y, crashed, k, s, ends):
 
 def test_leaving_the_lane_is_counted_once_each_time():
     batch = batch_of()
-    batch.memories["in_lane"] = True
+    batch.memories["in_lane"], batch.scenes["lane_width"] = True, 4.0
     for y in (0.0, 2.1, 2.5, 1.9, -2.1, 0.0):
         batch.scenes["z"][0, 1] = y
         evaluate(batch, 20)

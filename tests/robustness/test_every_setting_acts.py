@@ -128,6 +128,7 @@ VALUES = {
     "actuator.acceleration_rate": 1.0,
     "actuator.steering_rate": 0.05,
     "persons": ["attentive"],
+    "recording": {"file": "example", "ego": None, "drawn": False},
     "observation.type": extras.OBSERVATION,
     "reward_terms": [{"term": extras.TERM, "weight": 1.0}],
     "person.lane_position": 0.2,
@@ -145,6 +146,7 @@ REFUSED = {
     "other_vehicles_type": "knows no plans",
     "neighbour_vehicles_connected_lanes": "would not act",
     "driver_lag.direct": "a direct driver has an arm",
+    "recording": "would not act: the recording",
 }
 # Acts on the clock or on a window alone.
 NOT_SEEN = {"real_time_rendering", "offscreen_rendering"}

@@ -407,7 +407,8 @@ def test_starts_without_highway_env():
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_memory_of_an_environment(name):
     env = gym.make_vec(name, num_envs=64).unwrapped
-    assert sum(array.nbytes for array in env._batch) // 64 == env.bytes_per_environment <= 4608
+    most = 5_700 if name != "SharedControl/Recorded-v1" else 15_000  # a long line, and many vehicles
+    assert sum(array.nbytes for array in env._batch) // 64 == env.bytes_per_environment <= most
 
 
 class Failing:

@@ -29,7 +29,7 @@ class Situation(NamedTuple):
         memory: what the loop carries; ``u_h_act`` is the driver's present actual command [m/s^2, rad].
         p: parameters.
         traffic: other vehicles, shape (n, 8).
-        line: reference line of the road, shape (m, 6).
+        line: reference line of the road, shape (m, 12).
         trial: scratch for :func:`risks_of`.
         motion: scratch for :func:`risks_of`.
         assess: address of the risk assessment.

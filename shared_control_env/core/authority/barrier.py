@@ -97,7 +97,7 @@ def steering_bounds(scene: Scene, p: Parameters) -> tuple[float, float]:
     """
     z, car = scene.z, p.model
     low, high = lateral_bounds(scene.area, z[S])
-    low, high = max(low, scene.y_target - 0.5 * p.task.lane_width), min(high, scene.y_target + 0.5 * p.task.lane_width)
+    low, high = max(low, scene.y_target - 0.5 * scene.lane_width), min(high, scene.y_target + 0.5 * scene.lane_width)
     half = 0.5 * p.vehicle.width
     K_f, K_r, _ = linear_axles(car)
     v = max(z[V_X], SLOWEST_SLIP)

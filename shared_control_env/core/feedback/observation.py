@@ -165,7 +165,7 @@ def write_features(address: int, scene: Any, memory: Any, line: np.ndarray, para
         address: address of the observation's compiled function.
         scene: record of :data:`records.SCENE`.
         memory: record of :data:`records.MEMORY`.
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         parameters: record of :class:`core.parameters.Parameters`.
         out: written, float32, at least as many entries as features.
     """
@@ -183,7 +183,7 @@ def observe(
         scales: scales of the features, in the units of the features, shape (n,).
         scene: record of :data:`records.SCENE`.
         memory: record of :data:`records.MEMORY`, which holds the driver's last command.
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         p: parameters.
         out: observation [-], written, float32, shape (n,).
     """

@@ -66,7 +66,7 @@ def _progress(step: Step) -> float:
 
 def _lane(step: Step) -> float:
     """``-min(1, ((y - y_target) / (lane_width / 2))^2)``."""
-    return -min(1.0, (2.0 * (step.scene.z[1] - step.scene.y_target) / step.p.task.lane_width) ** 2)
+    return -min(1.0, (2.0 * (step.scene.z[1] - step.scene.y_target) / step.scene.lane_width) ** 2)
 
 
 def _speed(step: Step) -> float:

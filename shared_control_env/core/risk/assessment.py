@@ -48,7 +48,7 @@ def predict_ego(
         scene: record of :data:`records.SCENE`.
         u_f: degraded command ``[a, delta]`` [m/s^2, rad], shape (2,).
         tau: prediction horizon [s].
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         p: parameters.
         signals: record of :data:`records.SIGNALS`; ``prediction`` and ``prediction_road`` are written.
         work: scratch of the vehicle's motion.
@@ -74,7 +74,7 @@ def predict_neighbours(scene: Scene, traffic: np.ndarray, line: np.ndarray, tau:
     Args:
         scene: record of :data:`records.SCENE`.
         traffic: other vehicles, shape (n, 8).
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         tau: prediction horizon [s].
         predicted: rows ``[1 if present, s, v]`` [-, m, m/s], written, shape (3, 3).
     """
@@ -97,7 +97,7 @@ def assess(
         tau: prediction horizon [s]; the paper's is ``p.task.tau_p``.
         scene: record of :data:`records.SCENE` with the safe area.
         traffic: other vehicles, shape (n, 8).
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         p: parameters.
         signals: record of :data:`records.SIGNALS`; ``prediction``, ``prediction_road``, ``predicted_neighbours``,
             ``r_x`` and ``r_y`` are written.

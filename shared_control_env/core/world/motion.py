@@ -23,7 +23,7 @@ from shared_control_env.core.records import (
 )
 from shared_control_env.core.world.actuator import actuate
 from shared_control_env.core.world.collision import overlap
-from shared_control_env.core.world.traffic import decide_acceleration, move_along
+from shared_control_env.core.world.replay import advance, decide
 from shared_control_env.core.world.vehicle import plant_step
 
 
@@ -33,10 +33,12 @@ class Motion:
     Attributes:
         row: the ego as a row of the traffic array.
         plant: scratch of the vehicle's simulation step.
+        trial: scratch of replayed vehicles that look ahead.
     """
 
     row: Annotated[np.ndarray, (8,)]
     plant: Annotated[np.ndarray, (2, 6)]
+    trial: Annotated[np.ndarray, (3, 8)]
 
 
 def move(
@@ -64,7 +66,7 @@ def move(
         state: ego ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
         traffic: other vehicles, overwritten, shape (M, 8).
         plans: their plans, records of :class:`core.parameters.TrafficParameters`, shape (M,).
-        line: reference line of the road, shape (n, 6).
+        line: reference line of the road, shape (n, 12).
         memory: record of :data:`records.MEMORY`; the output of the actuators, ``realised``, is updated.
         transition: record of :data:`records.TRANSITION`; ``crashed`` is set on a collision.
         work: scratch.
@@ -72,15 +74,15 @@ def move(
     realised, row = memory.realised, work.row
     row[BODY_LENGTH], row[BODY_WIDTH] = p.vehicle.length, p.vehicle.width
     for frame in range(frames):
-        t = (k * frames + frame) * dt
-        row[X], row[Y], row[SPEED] = state[0], state[1], state[3]
+        row[X], row[Y], row[HEADING], row[SPEED] = state[0], state[1], state[2], state[3]
+        step = k * frames + frame
         for j in range(traffic.shape[0]):
-            decide_acceleration(traffic[j], plans[j], t, row, traffic, line, p.task.lane_width)
+            decide(j, plans, traffic, row, step, dt, line, work.trial)
         actuate(signals.u, dt, p.actuator, realised)
         plant_step(state, realised[0], realised[1], dt, p.vehicle, work.plant)
         row[X], row[Y], row[HEADING] = state[0], state[1], state[2]
         for j in range(traffic.shape[0]):
-            move_along(traffic[j], plans[j], line, t, dt)
+            advance(j, plans, traffic, row, step, dt, line)
         for j in range(traffic.shape[0]):
             if overlap(row, traffic[j]):
                 transition.crashed = True

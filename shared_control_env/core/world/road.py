@@ -1,9 +1,10 @@
 """The road's reference line: straights and arcs, and the road frame ``(s, d)`` along it.
 
-A line is an array of segments, one row ``[s0, x0, y0, psi0, kappa, length]`` per segment. A row holds the path length
-and the pose at the start of the segment [m, m, m, rad], the curvature (positive to the left) [1/m] and the length [m].
-Rows with an infinite ``s0`` only fill up the array; they are not segments. ``d`` is the offset to the left of the line.
-The centre of a lane is the line shifted by the lane's ``d``.
+A line is an array of segments, one row ``[s0, x0, y0, psi0, kappa, length, ...]`` per segment. A row holds the path
+length and the pose at the start of the segment [m, m, m, rad], the curvature (positive to the left) [1/m] and the
+length [m]; then the width of a lane and the offsets of the road's right and left edge, each at the start of the segment
+[m] and as its slope along it [-]. Rows with an infinite ``s0`` only fill up the array; they are not segments. ``d`` is
+the offset to the left of the line. The centre of a lane is the line shifted by the lane's ``d``.
 """
 
 from __future__ import annotations
@@ -15,30 +16,38 @@ import numpy as np
 
 from shared_control_env.core.compile.jit import jit
 
-S0, X0, Y0, PSI0, KAPPA, LENGTH = range(6)
+S0, X0, Y0, PSI0, KAPPA, LENGTH, WIDTH, WIDTH_SLOPE, RIGHT, RIGHT_SLOPE, LEFT, LEFT_SLOPE = range(12)
 """Indices in a segment's row."""
+
+COLUMNS = 12
+"""Length of a segment's row."""
 
 MAX_ARC = pi / 2
 """Largest angle of one arc segment [rad]: the angles of highway-env's CircularLane wrap after half a turn."""
 
 
-def reference_line(segments: Sequence[tuple[float, float]], lead_in: float = 0.0) -> np.ndarray:
+def reference_line(
+    segments: Sequence[tuple[float, float]], lead_in: float = 0.0, lane_width: float = 4.0, lanes: int = 2
+) -> np.ndarray:
     """Chain ``(length, curvature)`` pairs into a line that passes the origin along x at s = 0.
 
     Args:
         segments: pairs of length [m] and curvature [1/m], starting at s = 0.
         lead_in: length of a straight segment before s = 0 [m].
+        lane_width: width of a lane [m].
+        lanes: number of lanes; the line is the centre of the rightmost.
 
     Returns:
-        Reference line, shape (n, 6); arcs longer than :data:`MAX_ARC` are split.
+        Reference line, shape (n, 12); arcs longer than :data:`MAX_ARC` are split.
     """
     rows: list[list[float]] = []
     s = x = -lead_in
     y = psi = 0.0
+    sides = [lane_width, 0.0, -0.5 * lane_width, 0.0, lanes * lane_width - 0.5 * lane_width, 0.0]
     for length, kappa in [(lead_in, 0.0), *segments] if lead_in else segments:
         pieces = max(1, ceil(abs(kappa) * length / MAX_ARC))
         for _ in range(pieces):
-            rows.append([s, x, y, psi, kappa, length / pieces])
+            rows.append([s, x, y, psi, kappa, length / pieces, *sides])
             x, y, psi = point_at(np.array(rows), s + length / pieces, 0.0)
             s += length / pieces
     return np.array(rows)
@@ -49,7 +58,7 @@ def segment_at(line: np.ndarray, s: float) -> int:
     """Index of the segment that contains a path length; the first and the last segment extend beyond the line.
 
     Args:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         s: path length [m].
     """
     i = 0
@@ -59,11 +68,36 @@ def segment_at(line: np.ndarray, s: float) -> int:
 
 
 @jit
+def width_at(line: np.ndarray, s: float) -> float:
+    """Width of a lane at a path length [m].
+
+    Args:
+        line: reference line, shape (n, 12).
+        s: path length [m].
+    """
+    row = line[segment_at(line, s)]
+    return row[WIDTH] + row[WIDTH_SLOPE] * (s - row[S0])
+
+
+@jit
+def edges_at(line: np.ndarray, s: float) -> tuple[float, float]:
+    """Offsets of the right and the left edge of the road at a path length [m].
+
+    Args:
+        line: reference line, shape (n, 12).
+        s: path length [m].
+    """
+    row = line[segment_at(line, s)]
+    along = s - row[S0]
+    return row[RIGHT] + row[RIGHT_SLOPE] * along, row[LEFT] + row[LEFT_SLOPE] * along
+
+
+@jit
 def curvature_at(line: np.ndarray, s: float, d: float) -> float:
     """Curvature of the shifted reference line [1/m].
 
     Args:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         s: path length along the unshifted line [m].
         d: shift to the left [m].
     """
@@ -76,7 +110,7 @@ def point_at(line: np.ndarray, s: float, d: float) -> tuple[float, float, float]
     """Cartesian position [m] and heading [rad] of the road at ``(s, d)``.
 
     Args:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         s, d: path length and offset to the left [m].
 
     Returns:
@@ -112,7 +146,7 @@ def locate(line: np.ndarray, x: float, y: float) -> tuple[float, float, float, f
     """Road-frame coordinates of a point, by projection onto the nearest segment.
 
     Args:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         x, y: Cartesian position [m].
 
     Returns:

@@ -26,7 +26,7 @@ from shared_control_env.core.records import (
     Y,
 )
 from shared_control_env.core.world.lane_change import change_progress, change_weight
-from shared_control_env.core.world.road import curvature_at, locate, wrap_angle
+from shared_control_env.core.world.road import curvature_at, edges_at, locate, width_at, wrap_angle
 
 _SHORTEST_REGION = 0.5
 """Smallest length of the driving region [m], used when the preceding vehicle is almost touched."""
@@ -37,7 +37,7 @@ def road_frame(line: np.ndarray, state: np.ndarray, z: np.ndarray) -> None:
     """Transform the ego state from the Cartesian frame to the road frame.
 
     Args:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         state: Cartesian state ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (6,).
         z: state ``[s, y, psi - psi_road, v_x, v_y, r]`` in the road frame, written, shape (6,).
     """
@@ -61,7 +61,6 @@ def find_neighbours(
     s_e: float,
     y_target: float,
     y_goal: float,
-    lane_width: float,
     neighbours: np.ndarray,
 ) -> None:
     """Find the preceding vehicle in the lane to keep, and the leader and the follower in the adjacent lanes.
@@ -71,12 +70,11 @@ def find_neighbours(
     off, even when the lane to keep is already the new one.
 
     Args:
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         traffic: other vehicles, columns as in :mod:`records`, shape (n, 8).
         s_e: the ego's path length [m].
         y_target: lateral position of the centre of the lane to keep [m].
         y_goal: lateral position of the centre of the lane changed to [m]; NaN if no change is under way.
-        lane_width: width of a lane [m].
         neighbours: rows of follower, leader and preceding vehicle, columns PRESENT to NEAR_ROW of :mod:`records`,
             written, shape (3, 5).
     """
@@ -85,7 +83,7 @@ def find_neighbours(
     for row in range(traffic.shape[0]):
         s, d, psi_road, _ = locate(line, traffic[row, X], traffic[row, Y])
         v = traffic[row, SPEED] * cos(traffic[row, HEADING] - psi_road)
-        offset = abs(d - y_target)
+        offset, lane_width = abs(d - y_target), width_at(line, s)
         if s >= s_e:
             if offset <= 1.5 * lane_width:
                 _keep_nearest(neighbours, PRECEDING if offset <= 0.5 * lane_width else LEADER, row, s, d, v, s_e)
@@ -141,7 +139,7 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
         k: time step.
         state: ego ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (6,).
         traffic: other vehicles, shape (n, 8).
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         p: parameters.
         scene: record of :data:`records.SCENE`, written.
     """
@@ -152,6 +150,8 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
         scene.state[i] = state[i]
     road_frame(line, state, scene.z)
     s_e = scene.z[0]
+    scene.lane_width = width_at(line, s_e)
+    scene.road_low, scene.road_high = edges_at(line, s_e)
     for i in range(max(p.automation.H_p, p.driver.H_p)):
         scene.kappa[i] = curvature_at(line, s_e + i * task.dt * state[3], 0.0)
     progress = change_progress(scene.t, task.change_onset, task.change_duration)
@@ -160,7 +160,7 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
     scene.y_target = task.y_target + (task.y_goal - task.y_target) * progress
     lane = task.y_target if progress < 0.5 else task.y_goal
     goal = task.y_goal if scene.changing else np.nan
-    find_neighbours(line, traffic, s_e, lane, goal, task.lane_width, scene.neighbours)
+    find_neighbours(line, traffic, s_e, lane, goal, scene.neighbours)
     preceding = scene.neighbours[PRECEDING]
     scene.v_target = task.target_speed
     end = s_e + p.safe_area.look_ahead
@@ -174,8 +174,8 @@ def perceive(k: int, state: np.ndarray, traffic: np.ndarray, line: np.ndarray, p
     leftmost = max(task.y_target, task.y_goal) if scene.changing else lane
     scene.region[0] = s_e
     scene.region[1] = max(end, s_e + _SHORTEST_REGION)
-    scene.region[2] = rightmost - 0.5 * task.lane_width
-    scene.region[3] = leftmost + 0.5 * task.lane_width
+    scene.region[2] = rightmost - 0.5 * scene.lane_width
+    scene.region[3] = leftmost + 0.5 * scene.lane_width
 
 
 @jit
@@ -184,7 +184,7 @@ def holes_in_region(traffic: np.ndarray, line: np.ndarray, region: np.ndarray, c
 
     Args:
         traffic: other vehicles, shape (n, 8).
-        line: reference line, shape (l, 6).
+        line: reference line, shape (l, 12).
         region: driving region: start, end, low, high [m], shape (4,).
         corners: corners (s, d) [m] of each vehicle, written, shape (m, 4, 2); further vehicles are left out.
 

@@ -10,7 +10,7 @@ from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.parameters import TrafficParameters
 from shared_control_env.core.records import ACCELERATION, BODY_LENGTH, HEADING, SPEED, YAW_RATE, X, Y
 from shared_control_env.core.world.lane_change import change_progress
-from shared_control_env.core.world.road import locate, point_at
+from shared_control_env.core.world.road import locate, point_at, width_at
 
 TIME_HEADWAY = 1.5
 """Time headway T of the Intelligent Driver Model [s]; that of highway-env's IDMVehicle."""
@@ -43,25 +43,33 @@ def idm_acceleration(v: float, v_0: float, gap: float, v_lead: float) -> float:
     Returns:
         Acceleration [m/s^2], not below ``-LARGEST_DECELERATION``.
     """
-    approach = v * (v - v_lead) / (2.0 * sqrt(LARGEST_ACCELERATION * COMFORTABLE_DECELERATION))
-    wanted = STANDSTILL_GAP + max(0.0, v * TIME_HEADWAY + approach)
+    wanted = desired_gap(v, v_lead)
     a = LARGEST_ACCELERATION * (1.0 - (v / v_0) ** 4 - (wanted / max(gap, 0.1)) ** 2)
     return max(a, -LARGEST_DECELERATION)
 
 
 @jit
-def _gap_ahead(row: np.ndarray, s: float, d: float, other: np.ndarray, line: np.ndarray, lane_width: float) -> float:
+def desired_gap(v: float, v_lead: float) -> float:
+    """Desired gap s* of the Intelligent Driver Model [m].
+
+    Args:
+        v, v_lead: speeds of the vehicle and of the one ahead [m/s].
+    """
+    approach = v * (v - v_lead) / (2.0 * sqrt(LARGEST_ACCELERATION * COMFORTABLE_DECELERATION))
+    return STANDSTILL_GAP + max(0.0, v * TIME_HEADWAY + approach)
+
+
+@jit
+def _gap_ahead(row: np.ndarray, s: float, d: float, other: np.ndarray, line: np.ndarray) -> float:
     """Distance from a vehicle's front to another's rear [m]; infinite if the other is not ahead in the same lane."""
     s_other, d_other, _, _ = locate(line, other[X], other[Y])
-    if s_other <= s or abs(d_other - d) > 0.5 * lane_width:
+    if s_other <= s or abs(d_other - d) > 0.5 * width_at(line, s):
         return np.inf
     return s_other - s - 0.5 * (row[BODY_LENGTH] + other[BODY_LENGTH])
 
 
 @jit
-def follow(
-    row: np.ndarray, v_0: float, ego: np.ndarray, traffic: np.ndarray, line: np.ndarray, lane_width: float
-) -> float:
+def follow(row: np.ndarray, v_0: float, ego: np.ndarray, traffic: np.ndarray, line: np.ndarray) -> float:
     """Acceleration [m/s^2] of a vehicle that follows the nearest vehicle ahead in its lane, the ego included.
 
     Args:
@@ -69,13 +77,12 @@ def follow(
         v_0: desired speed [m/s].
         ego: the ego as a row of the traffic array, shape (8,).
         traffic: all other vehicles, shape (n, 8).
-        line: reference line, shape (m, 6).
-        lane_width: width of a lane [m].
+        line: reference line, shape (m, 12).
     """
     s, d, _, _ = locate(line, row[X], row[Y])
-    gap, v_lead = _gap_ahead(row, s, d, ego, line, lane_width), ego[SPEED]
+    gap, v_lead = _gap_ahead(row, s, d, ego, line), ego[SPEED]
     for i in range(traffic.shape[0]):
-        other = _gap_ahead(row, s, d, traffic[i], line, lane_width)
+        other = _gap_ahead(row, s, d, traffic[i], line)
         if other < gap:
             gap, v_lead = other, traffic[i, SPEED]
     return idm_acceleration(row[SPEED], v_0, gap, v_lead)
@@ -89,7 +96,6 @@ def decide_acceleration(
     ego: np.ndarray,
     traffic: np.ndarray,
     line: np.ndarray,
-    lane_width: float,
 ) -> None:
     """Compute the acceleration of a vehicle from its plan, and write it into the vehicle's row.
 
@@ -102,12 +108,11 @@ def decide_acceleration(
         t: time [s].
         ego: the ego as a row of the traffic array, shape (8,).
         traffic: all other vehicles, this one among them, shape (n, 8).
-        line: reference line, shape (m, 6).
-        lane_width: width of a lane [m].
+        line: reference line, shape (m, 12).
     """
     row[ACCELERATION] = 0.0
     if plan.follows:
-        row[ACCELERATION] = follow(row, plan.desired_speed, ego, traffic, line, lane_width)
+        row[ACCELERATION] = follow(row, plan.desired_speed, ego, traffic, line)
     if t >= plan.brake_onset:
         row[ACCELERATION] = min(row[ACCELERATION], -plan.deceleration)
     if row[SPEED] <= 0.0:
@@ -123,7 +128,7 @@ def follow_lane(row: np.ndarray, line: np.ndarray, dt: float, shift: float) -> N
 
     Args:
         row: the vehicle's row of the traffic array, overwritten, shape (8,).
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         dt: step [s].
         shift: change of the offset, positive to the left [m].
     """
@@ -144,7 +149,7 @@ def move_along(row: np.ndarray, plan: TrafficParameters, line: np.ndarray, t: fl
     Args:
         row: the vehicle's row of the traffic array, overwritten, shape (8,).
         plan: plan of the vehicle.
-        line: reference line, shape (m, 6).
+        line: reference line, shape (m, 12).
         t: time at the start of the step [s].
         dt: step [s].
     """

@@ -101,7 +101,7 @@ export class World {
   surface(fill, back, ahead) {
     const { line, lanes, lane_width: width, spacing } = this.road;
     const here = this.index(), from = Math.max(0, here - back), to = Math.min(line.length - 1, here + ahead);
-    const low = -0.5 * width, high = (lanes - 0.5) * width;
+    const low = this.road.low, high = low + lanes * width;
     for (let i = from; i < to; i += 3) {
       const end = Math.min(i + 3, to);
       fill(this.strip(i, end, low - 0.9, high + 0.9), this.colour("road"));

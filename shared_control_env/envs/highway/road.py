@@ -9,7 +9,7 @@ from highway_env.road.lane import AbstractLane, CircularLane, LineType, Straight
 from highway_env.road.road import Road, RoadNetwork
 
 from shared_control_env.core.world.collision import find_collisions
-from shared_control_env.core.world.road import KAPPA, LENGTH, PSI0, S0, point_at
+from shared_control_env.core.world.road import KAPPA, LENGTH, PSI0, RIGHT, S0, point_at
 from shared_control_env.envs.highway.vehicles import write_row
 
 
@@ -20,22 +20,26 @@ class LineRoad(Road):
     overlap. Unlike highway-env, vehicles that are about to collide are not displaced.
 
     Args:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         lanes: number of lanes.
         lane_width: width of a lane [m].
         options: further arguments of highway-env's ``Road``.
 
     Attributes:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         rows: all vehicles as rows of the traffic array, the ego first, shape (n_vehicles, 8).
         lane_width: width of a lane [m].
         time: time since the start of the episode [s].
+        frames: number of simulation steps so far.
+        dt: simulation step [s].
+        plans: plans of the vehicles but the ego, records of :class:`core.parameters.TrafficParameters`, shape (n,).
     """
 
     def __init__(self, line: np.ndarray, lanes: int, lane_width: float, **options: Any) -> None:
         super().__init__(network=road_network(line, lanes, lane_width), **options)
         self.line, self.lane_width = line, lane_width
-        self.time, self._frames = 0.0, 0
+        self.time, self.frames, self.dt = 0.0, 0, 0.0
+        self.plans: np.ndarray | None = None
         self.rows = np.zeros((0, 8))
 
     def update_rows(self) -> np.ndarray:
@@ -54,8 +58,8 @@ class LineRoad(Road):
             frames: number of simulation steps.
             dt: simulation step [s].
         """
-        self._frames += frames
-        self.time = self._frames * dt  # a product, because a running sum would drift
+        self.frames += frames
+        self.time = self.frames * dt  # a product, because a running sum would drift
 
     def step(self, dt: float) -> None:
         """Move every vehicle by one simulation step, then mark vehicles that overlap as crashed.
@@ -84,7 +88,7 @@ def road_network(line: np.ndarray, lanes: int, lane_width: float) -> RoadNetwork
     highway-env's formulas do not depend on whether y points up or down.
 
     Args:
-        line: reference line, shape (n, 6).
+        line: reference line, shape (n, 12).
         lanes: number of lanes, counted from the right.
         lane_width: width of a lane [m].
 
@@ -92,6 +96,7 @@ def road_network(line: np.ndarray, lanes: int, lane_width: float) -> RoadNetwork
         Network with the nodes "0", "1", ... at the ends of the segments.
     """
     network = RoadNetwork()
+    first = round((line[0, RIGHT] + 0.5 * lane_width) / lane_width)  # not 0 where the line is not the rightmost lane
     for i, row in enumerate(line):
         for lane in range(lanes):
             right = LineType.CONTINUOUS_LINE if lane == 0 else LineType.NONE
@@ -100,7 +105,8 @@ def road_network(line: np.ndarray, lanes: int, lane_width: float) -> RoadNetwork
                 right = LineType.CONTINUOUS
             if row[KAPPA] and left == LineType.CONTINUOUS_LINE:
                 left = LineType.CONTINUOUS
-            network.add_lane(str(i), str(i + 1), _lane(line, row, lane * lane_width, lane_width, (right, left)))
+            d = (first + lane) * lane_width
+            network.add_lane(str(i), str(i + 1), _lane(line, row, d, lane_width, (right, left)))
     return network
 
 

@@ -157,8 +157,17 @@ class LaneFollower(ArrayVehicle):
     def __init__(self, road: Road, position: Any, heading: float = 0.0, speed: float = 0.0) -> None:
         super().__init__(road, position, heading, speed)
         self.array[BODY_LENGTH], self.array[BODY_WIDTH] = self.LENGTH, self.WIDTH
-        self.plan = pack(TrafficParameters())
+        self.plan, self._work = pack(TrafficParameters()), np.zeros((3, 8))
         self.step(0.0)
+
+    def take(self, row: np.ndarray) -> None:
+        """Take over a state with its body.
+
+        Args:
+            row: row of the traffic array, shape (8,).
+        """
+        self.array[:] = row
+        self.LENGTH, self.WIDTH = float(row[BODY_LENGTH]), float(row[BODY_WIDTH])
 
     def act(self, action: dict | str | None = None) -> None:
         """Decide on the acceleration according to the plan.
@@ -167,9 +176,12 @@ class LaneFollower(ArrayVehicle):
             action: ignored; an argument of highway-env's interface.
         """
         road = self.road
-        entries.decide_acceleration(
-            self.array, self.plan, road.time, road.rows[0], road.rows[1:], road.line, road.lane_width
-        )
+        if self.plan["track"]:
+            me, traffic = road.vehicles.index(self) - 1, road.rows[1:]
+            entries.decide(me, road.plans, traffic, road.rows[0], road.frames, road.dt, road.line, self._work)
+            self.array[ACCELERATION] = traffic[me, ACCELERATION]
+            return
+        entries.decide_acceleration(self.array, self.plan, road.time, road.rows[0], road.rows[1:], road.line)
 
     def step(self, dt: float) -> None:
         """Advance along the lane by one simulation step.
@@ -177,6 +189,12 @@ class LaneFollower(ArrayVehicle):
         Args:
             dt: simulation step [s].
         """
+        if self.plan["track"]:
+            road = self.road
+            me, traffic = road.vehicles.index(self) - 1, road.rows[1:]
+            entries.advance(me, road.plans, traffic, road.rows[0], road.frames, dt, road.line)
+            self.array[:] = traffic[me]
+            return
         entries.move_along(self.array, self.plan, self.road.line, self.road.time, dt)
 
 

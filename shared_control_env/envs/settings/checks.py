@@ -14,6 +14,7 @@ from shared_control_env.core import parameters as core
 from shared_control_env.core.faults.kinds import FACTOR, KINDS, LENGTH, RATE, SHARE, TIME, Kind
 from shared_control_env.core.records import MAX_DELAY
 from shared_control_env.envs.profiles import length_of
+from shared_control_env.envs.recorded.replay import files_in, read, usable
 from shared_control_env.envs.settings.changes import at, change, merge
 from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings, plain
 from shared_control_env.nearest import hint, nearest
@@ -40,7 +41,7 @@ NOT_DRAWN = (
     *("simulation_frequency", "policy_frequency"),
     *("screen_width", "screen_height", "centering_position", "scaling"),
     *("offscreen_rendering", "real_time_rendering", "neighbour_vehicles_connected_lanes", "other_vehicles_type"),
-    *("degradations", "randomise", "persons"),
+    *("degradations", "randomise", "persons", "recording"),
 )
 """Settings that must be the same in all episodes of an environment."""
 
@@ -59,6 +60,7 @@ def check(config: Mapping[str, Any]) -> Settings:
     """
     settings = _validated(config)
     _check_time(settings)
+    _check_recording(settings)
     _check_faults(settings)
     _check_road(settings)
     _check_places(settings)
@@ -158,6 +160,36 @@ def _check_time(settings: Settings) -> None:
         )
     if settings.steps < 1:
         raise ValueError(f"config['duration'] = {settings.duration} s must be at least one step of {1 / policy} s")
+
+
+def _check_recording(settings: Settings) -> None:
+    """Check that a recording can be read and has the ego, and that nothing is set that the recording decides."""
+    recording = settings.recording
+    if recording is None:
+        return
+    try:
+        files = files_in(recording.file)
+        for file in files:
+            found = usable(file, settings.duration)
+            if recording.ego is None and not found:
+                raise ValueError(f"{file} has no vehicle that is recorded for {settings.duration:g} s")
+            if recording.ego is not None and recording.ego not in (*read(file).tracks, *read(file).starts):
+                raise ValueError(f"{file} has no vehicle and no planning problem {recording.ego!r}")
+    except ValueError as error:
+        raise ValueError(f"config['recording']: {error}") from None
+    if recording.drawn:
+        return
+    default = Settings()
+    for field in ("road", "ego", "vehicles", "lane_change"):
+        if getattr(settings, field) != getattr(default, field):
+            raise ValueError(f"config[{field!r}] would not act: the recording in config['recording'] decides it")
+    for field in ("length", "width"):
+        _refuse_idle("config['vehicle']", settings.vehicle, field, False, "the recording says how large the car is")
+    if settings.other_vehicles_type != OWN_TRAFFIC:
+        raise ValueError(
+            f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} would not act: recorded vehicles have "
+            "tracks"
+        )
 
 
 def _check_faults(settings: Settings) -> None:

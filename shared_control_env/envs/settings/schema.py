@@ -119,6 +119,17 @@ class EgoSettings(Section):
     )
 
 
+class RecordingSettings(Section):
+    """Recorded traffic (envs.recorded); road, ego and vehicles are those of the recording.
+
+    The environment fills in what it has drawn, and sets ``drawn``.
+    """
+
+    file: Annotated[str, MinLen(1), MaxLen(4096)]  # a recording, or a folder of them, of which one is drawn
+    ego: Annotated[str, MinLen(1), MaxLen(200)] | None = None  # vehicle or planning problem; None to draw one
+    drawn: bool = False
+
+
 class BrakeSettings(Section):
     """Braking to a stop."""
 
@@ -236,7 +247,7 @@ class TermSettings(Section):
 
 
 _TASK_FROM_ROAD = (
-    *("dt", "lane_width", "road_high", "road_end", "y_target", "y_goal"),
+    *("dt", "road_end", "y_target", "y_goal"),
     *("change_onset", "change_duration"),
 )
 _Longitudinal = _section(
@@ -282,6 +293,7 @@ class Settings(Section):
     road: RoadSettings = RoadSettings()
     ego: EgoSettings = EgoSettings()
     lane_change: LaneChangeSettings | None = None  # of the ego; None to keep the lane
+    recording: RecordingSettings | None = None  # recorded traffic; None for the vehicles below
     vehicles: Annotated[list[VehicleSettings], MaxLen(100)] = []
     faults: Annotated[list[FaultSettings], MaxLen(20)] = []
     fault_at: Literal[PLACES] = "command"  # where degradations of the command act (core.faults)

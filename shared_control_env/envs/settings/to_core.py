@@ -33,7 +33,7 @@ def parameters_of(settings: Settings) -> core.Parameters:
 
     longitudinal = values(settings.longitudinal_risk)
     longitudinal["graded"] = longitudinal.pop("preset") == "graded"
-    width, change = settings.road.lane_width, settings.lane_change
+    change = settings.lane_change
     return core.Parameters(
         vehicle=core.VehicleParameters(**values(settings.vehicle, tyre=tyre.address_of(settings.vehicle.tyre))),
         model=model_of(settings),
@@ -61,8 +61,6 @@ def parameters_of(settings: Settings) -> core.Parameters:
         task=core.TaskParameters(
             **values(settings.task),
             dt=1.0 / settings.policy_frequency,
-            lane_width=width,
-            road_high=settings.lane_centre(settings.road.lanes) - 0.5 * width,
             road_end=settings.road_length,
             y_target=settings.lane_centre(settings.ego.lane),
             y_goal=settings.lane_centre(settings.ego.lane if change is None else change.lane),

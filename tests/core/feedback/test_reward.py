@@ -34,7 +34,7 @@ def step(
 ):
     transition, scene, signals = np.zeros((), TRANSITION), np.zeros((), SCENE), np.zeros((), SIGNALS)
     transition["failed"], transition["last_a"], transition["previous_s"] = failed, last_a, previous_s
-    scene["z"], scene["v_target"] = z, v
+    scene["z"], scene["v_target"], scene["lane_width"] = z, v, 4.0
     signals["u"], signals["u_h_act"], signals["u_a_act"] = u, u_h, u_a
     return transition, scene, signals
 

@@ -10,7 +10,7 @@ from shared_control_env.core.world.scene import following_speed
 from shared_control_env.envs.scenarios import SCENARIOS
 
 KEEPING = TaskParameters(target_speed=20.0, time_headway=1.2, standstill_gap=4.0, closing_time=1.5)
-DRAWN = list(SCENARIOS)[2:]
+DRAWN = [name for name in SCENARIOS if name not in ("two_lane", "curve", "recorded")]
 
 
 def test_without_a_headway_it_is_the_other_vehicles():

@@ -21,7 +21,7 @@ def drive(rows, plans, seconds, line=STRAIGHT, ego=FAR, dt=0.05):
     history = [rows.copy()]
     for k in range(round(seconds / dt)):
         for row, plan in zip(rows, plans, strict=True):
-            traffic.decide_acceleration(row, plan, k * dt, ego, rows, line, 4.0)
+            traffic.decide_acceleration(row, plan, k * dt, ego, rows, line)
         for row, plan in zip(rows, plans, strict=True):
             traffic.move_along(row, plan, line, k * dt, dt)
         history.append(rows.copy())
@@ -54,7 +54,7 @@ def test_idm_yields_to_the_ego():
     ego = vehicles((30.0, 0.5, 5.0))[0]
     rows = vehicles((0.0, 0.0, 12.0))
     plan = pack(TrafficParameters(follows=True, desired_speed=15.0))[()]
-    traffic.decide_acceleration(rows[0], plan, 0.0, ego, rows, STRAIGHT, 4.0)
+    traffic.decide_acceleration(rows[0], plan, 0.0, ego, rows, STRAIGHT)
     assert rows[0, ACCELERATION] < -1.0
 
 

@@ -130,18 +130,24 @@ def benchmark(
     engine: Engine = "local",
     out: Out = Path("results/benchmark"),
     fresh: Fresh = False,
+    recordings: Annotated[
+        str, typer.Option(help="Recording, or folder of them, for the suite recorded; that of the package by default.")
+    ] = "",
 ) -> None:
     """Run a suite with drivers under authorities; stopped at any moment, it goes on where it was."""
     from shared_control_env.evaluation.runner import evaluate
 
     console = Console()
     out = out.expanduser()
+    if suite != "recorded":
+        _refuse({"--recordings": bool(recordings)}, "without --suite recorded")
     with _running(console, out) as progress:
         table = evaluate(
             _names(drivers),
             _names(authorities),
             suite,
             seeds=_seeds(seeds),
+            config={"recording": {"file": str(Path(recordings).expanduser().resolve())}} if recordings else None,
             out=out,
             fresh=fresh,
             jobs=jobs,

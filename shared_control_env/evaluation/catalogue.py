@@ -174,6 +174,7 @@ SUITES: dict[str, Suite] = {
         ),
         ("none", *DRAWN_V1),
     ),
+    "recorded": Suite("recorded traffic x every degradation and none", ("recorded",), ("none", *DRAWN_V1)),
 }
 """Suites by name."""
 

@@ -19,11 +19,13 @@ from shared_control_env.controllers.allocators import Allocator, FuzzyAuthority,
 from shared_control_env.controllers.automation import Planner
 from shared_control_env.controllers.driver import Driver, checked_command
 from shared_control_env.core.parameters import PERSONS, TRAFFIC_BODY
-from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT
+from shared_control_env.core.records import NEAR_S, NEAR_SPEED, PRECEDING, PRESENT, SPEED
+from shared_control_env.core.world.road import locate
 from shared_control_env.envs.degradations import DEGRADATIONS
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import Settings, change, combined, defaults, plain
 from shared_control_env.envs.slots import AUTHORITY, DRIVER
+from shared_control_env.envs.starts import recorded
 from shared_control_env.evaluation.catalogue import AuthorityEntry, DriverEntry, Suite, choose_one
 from shared_control_env.evaluation.metrics import Trajectory, measure_all
 from shared_control_env.evaluation.severity import GradedFault, parse_fault
@@ -355,7 +357,28 @@ class Recorder:
             left_road=bool(self.left_road[i]),
             solver_failures=int(self.failures[i]),
             wall_time=wall_time,
+            human=human_of(settings, value["z"]),
         )
+
+
+def human_of(settings: Settings, z: np.ndarray) -> np.ndarray | None:
+    """Distance and difference of speed to the recorded vehicle whose place the ego has taken.
+
+    Args:
+        settings: settings of the episode.
+        z: states of the ego in the road frame, shape (T + 1, 6).
+
+    Returns:
+        Distance [m] and speed minus that of the vehicle [m/s] while it is recorded, shape (n, 2); None without one.
+    """
+    replay = None if settings.recording is None else recorded(settings)
+    if replay is None or replay.human is None:
+        return None
+    frames = settings.simulation_frequency // settings.policy_frequency
+    track = replay.human[: replay.human_steps : frames][: len(z)]
+    placed = np.array([locate(replay.line, x, y)[:2] for x, y in track[:, :2]])
+    distance = np.hypot(*(z[: len(track), :2] - placed).T)
+    return np.column_stack([distance, z[: len(track), 3] - track[:, SPEED]])
 
 
 class Policies:

@@ -60,6 +60,8 @@ class Trajectory:
         solver_failures: number of steps at which a solver of automation or driver failed, so that its last command was
             held.
         wall_time: computing time [s].
+        human: distance [m] to the recorded vehicle whose place the ego has taken, and speed minus its speed [m/s],
+            while it is recorded, shape (n, 2) with n at most T + 1; None without recorded traffic.
     """
 
     dt: float
@@ -85,6 +87,7 @@ class Trajectory:
     left_road: bool
     solver_failures: int
     wall_time: float
+    human: np.ndarray | None = None
 
     @property
     def onset(self) -> int | None:
@@ -420,6 +423,18 @@ def recovery_time(t: Trajectory) -> float:
         return 0.0
     recovered = outside[-1] + 1
     return float(recovered * t.dt) if t.onset + recovered < len(t.lateral_error) else np.nan
+
+
+@metric("m", "neither")
+def human_displacement(t: Trajectory) -> float:
+    """Mean distance to the recorded vehicle whose place the ego has taken, along and across the road."""
+    return np.nan if t.human is None else float(t.human[:, 0].mean())
+
+
+@metric("m/s", "neither")
+def human_speed_rms(t: Trajectory) -> float:
+    """Root mean square of v_x minus the speed of the recorded vehicle whose place the ego has taken."""
+    return np.nan if t.human is None else float(np.sqrt(np.mean(t.human[:, 1] ** 2)))
 
 
 @metric("-", "lower")

@@ -327,6 +327,84 @@ def test_single_and_vectorised_are_the_same(path):
             done = terminated or truncated
 
 
+@pytest.mark.parametrize(("ego", "at"), [("476", 2.0), ("450", 3.0)])
+def test_gap_headway_and_closing_are_those_of_the_file_by_hand(us101, ego, at):
+    """THW, TTC and DRAC along the record, from the raw positions and velocities of the file, without our code."""
+    import xml.etree.ElementTree as ElementTree
+
+    root = ElementTree.parse(us101).getroot()
+    states, sizes = {}, {}
+    for obstacle in root.findall("dynamicObstacle"):
+        sizes[obstacle.get("id")] = float(obstacle.findtext("shape/rectangle/length"))
+        for state in [*obstacle.findall("initialState"), *obstacle.findall("trajectory/state")]:
+            key = obstacle.get("id"), int(state.findtext("time/exact"))
+            values = ("position/point/x", "position/point/y", "velocity/exact", "orientation/exact")
+            states[key] = [float(state.findtext(name)) for name in values]
+    step = round(at / 0.1) + min(k for name, k in states if name == ego)
+    x, y, speed, heading = states[ego, step]
+    best = np.inf, None
+    for (name, k), (other_x, other_y, other_speed, _) in states.items():
+        if k != step or name == ego:
+            continue
+        along = (other_x - x) * np.cos(heading) + (other_y - y) * np.sin(heading)
+        across = -(other_x - x) * np.sin(heading) + (other_y - y) * np.cos(heading)
+        if along > 0.0 and abs(across) < 1.7 and along < best[0]:
+            best = along, (name, other_speed)
+    name, lead_speed = best[1]
+    gap = best[0] - 0.5 * (sizes[ego] + sizes[name])
+    env = made(us101, ego, duration=5.0)
+    env.reset(seed=0)
+    bare = env.unwrapped
+    replay = replay_of(us101, ego, 0.05, bare.episode.steps)
+    for k in range(round(at / 0.05) + 1):
+        human = replay.human[k]
+        bare.vehicle.array[:] = [human[X], human[Y], human[HEADING], human[SPEED], 0.0, human[YAW_RATE]]
+        info = env.step(np.zeros(2))[4]
+    z, ahead = info["z"], info["neighbours"][2]
+    ours = ahead[1] - z[0] - 0.5 * (sizes[ego] + sizes[name])
+    assert ours == pytest.approx(gap, abs=0.6)
+    assert ours / z[3] == pytest.approx(gap / speed, abs=0.1)
+    assert z[3] - ahead[3] == pytest.approx(speed - lead_speed, abs=0.8)
+    drac = [max(closing, 0.0) ** 2 / (2.0 * g) for closing, g in ((z[3] - ahead[3], ours), (speed - lead_speed, gap))]
+    assert drac[0] == pytest.approx(drac[1], abs=0.15)
+
+
+def test_the_suite_measures_against_the_recorded_human(tmp_path):
+    from shared_control_env.evaluation import evaluate
+    from shared_control_env.evaluation.catalogue import Suite
+
+    suite = Suite("one", ("recorded",), ("none", "step_bias"))
+    table = evaluate("internal_model", "proportional", suite, seeds=(0, 1), out=tmp_path / "out")
+    assert (table["human_displacement"] > 0.0).all()
+    assert (table["human_speed_rms"] < 20.0).all()
+    assert "recorded" in (tmp_path / "out/report.html").read_text()
+
+
+def test_the_command_takes_a_folder_of_recordings(tmp_path):
+    from typer.testing import CliRunner
+
+    from shared_control_env.cli import app
+
+    (tmp_path / "a.xml").write_text(GOOD)
+    arguments = [
+        "benchmark",
+        "--drivers",
+        "none",
+        "--authorities",
+        "paper",
+        "--seeds",
+        "0",
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    wrong = CliRunner().invoke(app, [*arguments, "--recordings", str(tmp_path)])
+    assert wrong.exit_code == 2
+    assert "--recordings would not act" in " ".join(wrong.output.replace("│", " ").split())
+    short = CliRunner().invoke(app, [*arguments, "--suite", "recorded", "--recordings", str(tmp_path)])
+    assert short.exit_code == 2
+    assert "recorded for 8 s" in " ".join(short.output.replace("│", " ").split())
+
+
 def test_a_folder_is_drawn_from_and_the_seed_decides(tmp_path):
     (tmp_path / "a.xml").write_text(GOOD)
     (tmp_path / "b.xml").write_text(GOOD.replace('id="7"', 'id="70"'))

@@ -57,6 +57,8 @@ FAULT = steps((20, 0), (80, 1)).astype(bool)  # sets in after 1 s
 def test_a_quiet_drive():
     quiet = m.measure_all(trajectory())
     undefined = {
+        "human_displacement",
+        "human_speed_rms",
         "min_gap",
         "min_thw",
         "min_ttc",
@@ -150,6 +152,10 @@ LATERAL = steps((10, 0.0), (20, 2.5), (10, 1.0), (5, -3.0), (55, 0.0))
         ("recovery_time", {"degraded": FAULT, "lateral_error": steps((30, 0.0), (70, 1.0))}, np.nan),
         ("recovery_time", {"degraded": FAULT, "crashed": True}, np.nan),
         ("solver_failures", {"solver_failures": 3}, 3.0),
+        ("human_displacement", {"human": np.array([[0.0, 1.0], [2.0, 1.0], [4.0, 1.0]])}, 2.0),
+        ("human_displacement", {}, np.nan),
+        ("human_speed_rms", {"human": np.array([[0.0, 3.0], [2.0, -4.0]])}, np.sqrt(12.5)),
+        ("human_speed_rms", {}, np.nan),
     ],
 )
 def test_values(name, changes, expected):

@@ -37,6 +37,7 @@ class Replay(NamedTuple):
         plans: their plans, records of :class:`core.parameters.TrafficParameters`, shape (V,).
         tracks: their tracks at the simulation steps, shape (V, T, 6).
         human: track of the vehicle whose place the ego has taken, shape (T, 6); None for a planning problem.
+        human_steps: number of its rows that are recorded.
         road_end: path length at which the episode ends [m].
         lanes: number of lanes.
     """
@@ -49,6 +50,7 @@ class Replay(NamedTuple):
     plans: np.ndarray
     tracks: np.ndarray
     human: np.ndarray | None
+    human_steps: int
     road_end: float
     lanes: int
 
@@ -175,8 +177,9 @@ def _made(path: Path, changed: int, size: int, ego: str, dt: float, steps: int) 
     ids = tuple(name for name in recording.tracks if name != ego)
     tracks, plans = np.zeros((len(ids), steps + 1, TRACK_COLUMNS)), np.zeros(len(ids), record_dtype(TrafficParameters))
     traffic = np.zeros((len(ids), 8))
-    human = None
+    human, human_steps = None, 0
     if ego in recording.tracks:
+        human_steps = int((times <= recording.tracks[ego].t[-1] + 1e-9).sum())
         human = np.ascontiguousarray(road.into(_within(recording, ego, times)))
     for i, name in enumerate(ids):
         track = recording.tracks[name]
@@ -199,7 +202,9 @@ def _made(path: Path, changed: int, size: int, ego: str, dt: float, steps: int) 
             traffic[i, [X, Y]] = AWAY
         traffic[i, [BODY_LENGTH, BODY_WIDTH]] = track.length, track.width
     state = np.array([pose[X], pose[Y], pose[HEADING], pose[SPEED], 0.0, pose[YAW_RATE]])
-    return Replay(line, state, body, ids, traffic, plans, tracks, human, road.end - s_ego - END, road.lanes)
+    return Replay(
+        line, state, body, ids, traffic, plans, tracks, human, human_steps, road.end - s_ego - END, road.lanes
+    )
 
 
 def _within(recording: Recording, name: str, times: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from shared_control_env.core.parameters import Limits
 
 KEYBOARD, GAMEPAD, WHEEL, SIMULATED = "keyboard", "gamepad", "wheel", "simulated"
-DEVICES = (KEYBOARD, GAMEPAD, WHEEL, SIMULATED)
+DeviceName = Literal["keyboard", "gamepad", "wheel", "simulated"]
 """Kinds of device."""
 
 LEFT, RIGHT, UP, DOWN = range(4)
@@ -67,10 +67,9 @@ class Axis(BaseModel):
         Args:
             reading: the raw reading.
         """
-        end = self.full
         if self.other is not None and (reading - self.rest) * (self.full - self.rest) < 0.0:
             return -min(1.0, (reading - self.rest) / (self.other - self.rest))
-        return min(1.0, max(0.0, (reading - self.rest) / (end - self.rest)))
+        return min(1.0, max(0.0, (reading - self.rest) / (self.full - self.rest)))
 
 
 class Calibration(BaseModel):

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from shared_control_env.drive.calibration import STEPS, calibrated
-from shared_control_env.drive.devices import KEYBOARD, SIMULATED, WHEEL, Axes, Calibration, Keyboard, Simulated
+from shared_control_env.drive.devices import KEYBOARD, WHEEL, Axes, Calibration, Keyboard, Simulated
 from shared_control_env.drive.latency import STALE, Line, Timing
-from shared_control_env.drive.protocol import Input, Sample
+from shared_control_env.drive.protocol import Input, Sample, check_device
 from shared_control_env.drive.session import Choice, Drive
 from shared_control_env.drive.view import frame_of, road_of
 
@@ -87,8 +87,9 @@ class Seat:
             failed: called when a step or ``finished`` has failed, which the pages have been told.
 
         Raises:
-            ValueError: if the choice is not possible, or the device lacks axes of the calibration.
+            ValueError: if the choice is not possible, the device has no calibration that it needs, or lacks axes of it.
         """
+        check_device(device, calibration)
         await self.clear()
         self.state = PREPARING
         self.send({"type": "state", "state": PREPARING})
@@ -98,13 +99,11 @@ class Seat:
             self.state = EMPTY
             raise
         self.drive, self.shown, self._finished, self._failed = drive, shown, finished, failed
-        self._device: Keyboard | Axes | Simulated = (
-            Keyboard(drive.limits)
-            if device == KEYBOARD
-            else Simulated(drive.limits)
-            if device == SIMULATED
-            else Axes(_given(calibration), drive.limits)
-        )
+        self._device: Keyboard | Axes | Simulated
+        if calibration is not None:
+            self._device = Axes(calibration, drive.limits)
+        else:
+            self._device = Keyboard(drive.limits) if device == KEYBOARD else Simulated(drive.limits)
         self._source = self.native if device == WHEEL else None  # two devices never mix
         self._calibration, self._readings = calibration, np.zeros(self._device.readings)
         if self._source is not None and len(self._source.read(self.clock())[0]) < self._device.readings:
@@ -176,7 +175,7 @@ class Seat:
             message: the readings.
 
         Raises:
-            ValueError: if the device has more readings than these.
+            ValueError: if there are fewer readings than the device has.
         """
         if self.drive is None or self.state not in (READY, DRIVING, PAUSED) or message.device != self._kind:
             return
@@ -316,9 +315,3 @@ def _prepared(choice: Choice) -> Drive:
     first.step(first.person.command, np.zeros(1), Timing(0.0, 0.0, 0.0))
     first.close()
     return Drive(choice)
-
-
-def _given(calibration: Calibration | None) -> Calibration:
-    if calibration is None:
-        raise ValueError("the device needs a calibration")
-    return calibration

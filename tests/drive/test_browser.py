@@ -144,12 +144,15 @@ def test_it_fits_and_follows_the_colours_of_the_reader(opened, width, scheme):
     assert opened.execute_script("return window.drive.world.colour('ink')") != ""
 
 
-def test_a_gamepad_is_calibrated_and_drives(opened):
-    """A made-up gamepad: the page asks for movements, the server finds the axes, and the stick turns the wheel."""
-    opened.execute_script(
-        "window.pad = {id: 'made up', connected: true, axes: [0, 0, 0], buttons: []};"
-        "navigator.getGamepads = () => [window.pad];"
-    )
+PLUG_IN = """
+window.pad = {id: 'made up', connected: true, axes: arguments[0], buttons: []};
+navigator.getGamepads = () => [window.pad];
+"""
+
+
+def drive_with_a_gamepad(opened):
+    """Plug a made-up gamepad in, calibrate it, and begin to drive."""
+    opened.execute_script(PLUG_IN, [0, 0, 0])
     choose(opened, scenario="lane_keeping", degradation="none", device="gamepad")
     press(opened, "Drive")
     for axes in ([-1, 0, 1], [1, 0, 1], [0, 0, 1], [0, -1, 1], [0, 0, 1], [0, 0, -1], [0, 0, 1]):
@@ -159,6 +162,11 @@ def test_a_gamepad_is_calibrated_and_drives(opened):
     wait(opened, "ready")
     key(opened, " ")
     wait(opened, "driving")
+
+
+def test_a_gamepad_is_calibrated_and_drives(opened):
+    """A made-up gamepad: the page asks for movements, the server finds the axes, and the stick turns the wheel."""
+    drive_with_a_gamepad(opened)
     opened.execute_script("window.pad.axes = [-0.6, 0, 1]")
     time.sleep(0.4)
     assert frame(opened)["wheel"][1] > 0.05
@@ -166,20 +174,10 @@ def test_a_gamepad_is_calibrated_and_drives(opened):
 
 def test_after_a_reload_the_page_drives_with_the_same_device(opened):
     """And not with the keyboard, whose keys would be taken for axes."""
-    made_up = "window.pad = {id: 'made up', connected: true, axes: [0, 0, 1], buttons: []}; navigator.getGamepads = () => [window.pad];"
-    opened.execute_script(made_up)
-    choose(opened, scenario="lane_keeping", degradation="none", device="gamepad")
-    press(opened, "Drive")
-    for axes in ([-1, 0, 1], [1, 0, 1], [0, 0, 1], [0, -1, 1], [0, 0, 1], [0, 0, -1], [0, 0, 1]):
-        opened.execute_script("window.pad.axes = arguments[0]", axes)
-        press(opened, "Next")
-        time.sleep(0.05)
-    wait(opened, "ready")
-    key(opened, " ")
-    wait(opened, "driving")
+    drive_with_a_gamepad(opened)
     opened.refresh()
     wait(opened, "paused")
-    opened.execute_script(made_up)
+    opened.execute_script(PLUG_IN, [0, 0, 1])
     assert opened.execute_script("return window.drive.input.device") == "gamepad"
     key(opened, "ArrowLeft")
     key(opened, " ")

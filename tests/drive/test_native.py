@@ -132,15 +132,20 @@ def test_a_device_without_forces_is_refused():
         feedback_of("Made Up Wheel", 0.1)
 
 
-def test_it_drives_and_the_page_does_not(folder):
-    """Two devices never mix: while the wheel drives, the page's inputs count for nothing."""
-    joystick, device = Joystick(0.0, 1.0, 1.0), Device()
+def serving_with(joystick, device, folder):
+    """Serve free drives by a wheel with forces."""
 
     def make(seat):
         seat.native = NativeWheel(joystick, joystick.attached, Feedback(device, 0.1, ff, ecodes))
         return FreeDriving(seat, folder, Choice())
 
-    serving = Serving(make)
+    return Serving(make)
+
+
+def test_it_drives_and_the_page_does_not(folder):
+    """Two devices never mix: while the wheel drives, the page's inputs count for nothing."""
+    joystick, device = Joystick(0.0, 1.0, 1.0), Device()
+    serving = serving_with(joystick, device, folder)
     with serving.connect() as connection:
         page = Page(connection)
         assert page.until("welcome")["native"] == "Made Up Wheel"
@@ -169,12 +174,7 @@ def test_it_drives_and_the_page_does_not(folder):
 
 def test_a_wheel_that_is_unplugged_pauses_and_forces_end_with_the_drive(folder):
     joystick, device = Joystick(0.0, 1.0, 1.0), Device()
-
-    def make(seat):
-        seat.native = NativeWheel(joystick, joystick.attached, Feedback(device, 0.1, ff, ecodes))
-        return FreeDriving(seat, folder, Choice())
-
-    serving = Serving(make)
+    serving = serving_with(joystick, device, folder)
     with serving.connect() as connection:
         page = Page(connection)
         page.start(degradation="bias_ramp", authority="none", device="wheel", calibration=WHEEL.model_dump())

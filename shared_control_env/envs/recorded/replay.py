@@ -32,8 +32,7 @@ class Replay(NamedTuple):
         line: reference line through the ego's lane, s = 0 at the ego's start, shape (n, 12).
         ego: state of the ego at the start, shape (6,).
         body: length and width of the ego [m]; None for a planning problem.
-        ids: ids of the other vehicles, V of them.
-        traffic: their rows at the start, shape (V, 8).
+        traffic: rows of the other V vehicles at the start, shape (V, 8).
         plans: their plans, records of :class:`core.parameters.TrafficParameters`, shape (V,).
         tracks: their tracks at the simulation steps, shape (V, T, 6).
         human: track of the vehicle whose place the ego has taken, shape (T, 6); None for a planning problem.
@@ -45,7 +44,6 @@ class Replay(NamedTuple):
     line: np.ndarray
     ego: np.ndarray
     body: tuple[float, float] | None
-    ids: tuple[str, ...]
     traffic: np.ndarray
     plans: np.ndarray
     tracks: np.ndarray
@@ -86,10 +84,15 @@ def read(path: Path) -> Recording:
     Raises:
         ValueError: for a file that is none, or wrong in itself.
     """
+    return _read(*_version(path))
+
+
+def _version(path: Path) -> tuple[Path, int, int]:
+    """A file as it is now: path, time of its last change and size. What is read is kept by these."""
     if not path.is_file():
         raise ValueError(f"{path}: there is no such file")
     stat = path.stat()
-    return _read(path, stat.st_mtime_ns, stat.st_size)
+    return path, stat.st_mtime_ns, stat.st_size
 
 
 @lru_cache(maxsize=64)
@@ -108,9 +111,7 @@ def usable(path: Path, duration: float) -> tuple[str, ...]:
         path: the recording.
         duration: duration of an episode [s].
     """
-    read(path)  # says what is wrong with the file
-    stat = path.stat()
-    return _usable(path, stat.st_mtime_ns, stat.st_size, duration)
+    return _usable(*_version(path), duration)
 
 
 @lru_cache(maxsize=256)
@@ -147,9 +148,7 @@ def replay_of(path: Path, ego: str, dt: float, steps: int) -> Replay:
     Raises:
         ValueError: for an id that is not there, or an ego on no lane.
     """
-    read(path)  # says what is wrong with the file
-    stat = path.stat()
-    return _made(path, stat.st_mtime_ns, stat.st_size, ego, dt, steps)
+    return _made(*_version(path), ego, dt, steps)
 
 
 @cache
@@ -202,9 +201,7 @@ def _made(path: Path, changed: int, size: int, ego: str, dt: float, steps: int) 
             traffic[i, [X, Y]] = AWAY
         traffic[i, [BODY_LENGTH, BODY_WIDTH]] = track.length, track.width
     state = np.array([pose[X], pose[Y], pose[HEADING], pose[SPEED], 0.0, pose[YAW_RATE]])
-    return Replay(
-        line, state, body, ids, traffic, plans, tracks, human, human_steps, road.end - s_ego - END, road.lanes
-    )
+    return Replay(line, state, body, traffic, plans, tracks, human, human_steps, road.end - s_ego - END, road.lanes)
 
 
 def _within(recording: Recording, name: str, times: np.ndarray) -> np.ndarray:

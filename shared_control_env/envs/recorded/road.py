@@ -41,18 +41,15 @@ class LaneRoad(NamedTuple):
         line: reference line with s = 0 at its beginning, in a frame in which it begins at the origin along x.
         origin: position of the beginning in the recording, shape (2,) [m].
         turn: heading of the line there [rad].
-        begin, end: path lengths between which the recording has lanes [m].
+        end: path length at which the recorded lanes end [m].
         lanes: number of lanes side by side.
-        to_right: number of lanes to the right of this one.
     """
 
     line: np.ndarray
     origin: np.ndarray
     turn: float
-    begin: float
     end: float
     lanes: int
-    to_right: int
 
     def into(self, rows: np.ndarray) -> np.ndarray:
         """Positions and headings of the recording in the frame of the line.
@@ -83,8 +80,8 @@ def road_along(recording: Recording, x: float, y: float) -> LaneRoad:
     middle = 0.5 * (_at_shares(left) + _at_shares(right))
     line, origin, turn = _line_through(_resampled(middle))
     length = float(line[-1, S0] + line[-1, LENGTH]) - 2.0 * BEYOND
-    made = LaneRoad(line, origin, turn, BEYOND, BEYOND + length, 1, 0)
     rightmost, leftmost = _outermost(recording, chain[0], "right"), _outermost(recording, chain[0], "left")
+    made = LaneRoad(line, origin, turn, BEYOND + length, len(rightmost) + len(leftmost) - 1)
     borders = {
         "lane": (left, right),
         "road": tuple(
@@ -93,7 +90,7 @@ def road_along(recording: Recording, x: float, y: float) -> LaneRoad:
         ),
     }
     _write_widths(made, borders)
-    return made._replace(lanes=len(rightmost) + len(leftmost) - 1, to_right=len(rightmost) - 1)
+    return made
 
 
 def most_rows(recording: Recording) -> int:

@@ -147,11 +147,17 @@ def test_other_people_are_not_mixed_in(plan, tmp_path):
         StudyFolder(out, plan, "S01")
 
 
-def test_a_second_begin_while_driving_is_refused(plan, tmp_path):
+def served(plan, tmp_path):
+    """A study whose person has agreed and drives by the keyboard, with its server."""
     folder = StudyFolder(tmp_path / "study", plan)
     folder.agree(True)
     folder.choose_device({"device": "keyboard", "calibration": None})
     serving = Serving(lambda seat: StudyProgramme(seat, folder))
+    return folder, serving
+
+
+def test_a_second_begin_while_driving_is_refused(plan, tmp_path):
+    folder, serving = served(plan, tmp_path)
     with serving.connect() as connection:
         page = Page(connection)
         page.until("step", step="next")
@@ -169,10 +175,7 @@ def test_a_second_begin_while_driving_is_refused(plan, tmp_path):
 
 
 def test_a_drive_that_fails_comes_again(plan, tmp_path, monkeypatch):
-    folder = StudyFolder(tmp_path / "study", plan)
-    folder.agree(True)
-    folder.choose_device({"device": "keyboard", "calibration": None})
-    serving = Serving(lambda seat: StudyProgramme(seat, folder))
+    folder, serving = served(plan, tmp_path)
     with serving.connect() as connection:
         page = Page(connection)
         title = page.until("step", step="next")["title"]

@@ -179,6 +179,13 @@ def test_what_the_recording_decides_cannot_be_set():
             gym.make(ID, config=config)
 
 
+@pytest.mark.parametrize("setting", ["ego.speed", "vehicle.length", "road.lane_width"])
+def test_what_the_recording_decides_is_not_drawn(setting):
+    entry = {"setting": setting, "low": 4.0, "high": 5.0}
+    with pytest.raises(ValueError, match=f"draws '{setting}', which the recording"):
+        gym.make(ID, config={"randomise": [entry]})
+
+
 # The road
 
 

@@ -45,6 +45,9 @@ NOT_DRAWN = (
 )
 """Settings that must be the same in all episodes of an environment."""
 
+DECIDED = ("road", "ego", "vehicles", "lane_change")
+"""Settings that a recording decides, beside the length and the width of the car."""
+
 
 def check(config: Mapping[str, Any]) -> Settings:
     """Check a merged config.
@@ -180,7 +183,7 @@ def _check_recording(settings: Settings) -> None:
     if recording.drawn:
         return
     default = Settings()
-    for field in ("road", "ego", "vehicles", "lane_change"):
+    for field in DECIDED:
         if getattr(settings, field) != getattr(default, field):
             raise ValueError(f"config[{field!r}] would not act: the recording in config['recording'] decides it")
     for field in ("length", "width"):
@@ -274,6 +277,9 @@ def _check_random(settings: Settings) -> None:
         seen[entry.setting] = i
         if path[0] in NOT_DRAWN or path[-1] == "seed":
             raise ValueError(f"{name}['setting'] = {entry.setting!r} cannot be drawn")
+        decided = path[0] in DECIDED or entry.setting in ("vehicle.length", "vehicle.width")
+        if settings.recording is not None and decided:
+            raise ValueError(f"{name} draws {entry.setting!r}, which the recording in config['recording'] decides")
         if isinstance(present, bool | str | list | Mapping):
             raise ValueError(f"{name}['setting'] = {entry.setting!r} is no number, so it cannot be drawn")
         given = entry.model_dump(exclude_none=True)

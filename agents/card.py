@@ -1,4 +1,4 @@
-"""The card of a policy, written when the policy is trained; :mod:`shared_control_env.learned.card` checks it."""
+"""The card of a policy that is trained in the environments of :mod:`agents.tasks`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 from agents.tasks import training_config
 from shared_control_env.evaluation.episodes import versions
-from shared_control_env.learned.history import HISTORY
-from shared_control_env.learned.views import DEAD_ZONE, FEATURES_OF
+from shared_control_env.learned.card import new_card
+from shared_control_env.learned.views import DEAD_ZONE
 
 
 def card_of(
@@ -30,15 +30,21 @@ def card_of(
         hyperparameters: hyperparameters of the algorithm.
         libraries: distributions whose versions are stored in addition to the package's own versions.
     """
-    return {
-        "algorithm": algorithm,
-        "environments": list(ids),
-        "task": task,
-        "seed": seed,
-        "history": HISTORY,
-        "dead_zone": DEAD_ZONE,
-        "hyperparameters": dict(hyperparameters),
-        "config": {id: training_config(id, task) for id in ids},
-        "features": [name for name, _ in FEATURES_OF[task]],
-        "versions": ", ".join([versions(), *(f"{name} {version(name)}" for name in libraries)]),
-    }
+    return new_card(
+        algorithm,
+        task,
+        seed,
+        hyperparameters,
+        {id: training_config(id, task) for id in ids},
+        DEAD_ZONE,
+        versions_with(libraries),
+    )
+
+
+def versions_with(libraries: Sequence[str]) -> str:
+    """Versions of the package, of what it needs, and of further libraries.
+
+    Args:
+        libraries: names of the distributions.
+    """
+    return ", ".join([versions(), *(f"{name} {version(name)}" for name in libraries)])

@@ -1,4 +1,4 @@
-"""The check of a policy's card: whether the policy fits the present tasks, observations and environments."""
+"""The card of a policy: how it was trained, and the check whether it fits the present tasks and environments."""
 
 from __future__ import annotations
 
@@ -7,8 +7,51 @@ from pathlib import Path
 from typing import Any
 
 from shared_control_env.learned.history import HISTORY
-from shared_control_env.learned.views import DEAD_ZONE, FEATURES_OF
+from shared_control_env.learned.views import FEATURES_OF
 from shared_control_env.registration import ENVIRONMENTS
+
+
+def new_card(
+    algorithm: str,
+    task: str,
+    seed: int,
+    hyperparameters: Mapping[str, Any],
+    config: Mapping[str, Mapping[str, Any]],
+    dead_zone: float,
+    versions: str,
+) -> dict[str, Any]:
+    """The card of a training.
+
+    Args:
+        algorithm: name of the algorithm.
+        task: key of :data:`shared_control_env.learned.views.FEATURES_OF`.
+        seed: seed of all random numbers.
+        hyperparameters: hyperparameters of the algorithm.
+        config: changes to the settings of each environment, by its id.
+        dead_zone: dead zone of a driver's policy [-].
+        versions: versions of the libraries.
+    """
+    return {
+        "algorithm": algorithm,
+        "environments": list(config),
+        "task": task,
+        "seed": seed,
+        "history": HISTORY,
+        "dead_zone": dead_zone,
+        "hyperparameters": dict(hyperparameters),
+        "config": dict(config),
+        "features": [name for name, _ in FEATURES_OF[task]],
+        "versions": versions,
+    }
+
+
+def is_direct(card: Mapping[str, Any]) -> bool:
+    """Whether a policy's command is u_h,act itself, past the lag of Eq. 16: it was cloned from a person with an arm.
+
+    Args:
+        card: card of the policy.
+    """
+    return any(config.get("driver_lag", {}).get("direct", False) for config in card.get("config", {}).values())
 
 
 def check_card(path: Path, card: Mapping[str, Any]) -> None:
@@ -39,8 +82,9 @@ def check_card(path: Path, card: Mapping[str, Any]) -> None:
         raise ValueError(f"{path} was trained on other observations; they differ in {changed}")
     if card["history"] != HISTORY:
         raise ValueError(f"{path} was trained on a history of {card['history']} observations; it is now {HISTORY}")
-    if task == "driver" and card["dead_zone"] != DEAD_ZONE:
-        raise ValueError(f"{path} was trained with a dead zone of {card['dead_zone']}; now it is {DEAD_ZONE}")
+    zone = card["dead_zone"]
+    if isinstance(zone, bool) or not isinstance(zone, int | float) or not 0.0 <= zone < 1.0:
+        raise ValueError(f"{path}: dead_zone = {zone!r} in its card must be a number in [0, 1)")
     for id in card["environments"]:
         if id not in ENVIRONMENTS:
             name = id.rsplit("-v", 1)[0]

@@ -187,7 +187,7 @@ class LearnedDriver:
             scene: record of :data:`core.records.SCENE`; the felt command is used.
         """
         seen = self._history.push(driver_view(observation, scene["felt"])[None])
-        return command(self._policy.act(seen))[0] * self._limits
+        return command(self._policy.act(seen), self._policy.card["dead_zone"])[0] * self._limits
 
 
 class LearnedAllocator:

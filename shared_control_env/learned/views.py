@@ -62,7 +62,7 @@ FEATURES_OF = {"driver": DRIVER_FEATURES, "allocator": ALLOCATOR_FEATURES}
 """What a policy of each task sees."""
 
 DEAD_ZONE = 0.06
-"""Dead zone of a driver's policy: smaller actions, as shares of the limits, give a zero command [-]."""
+"""Dead zone of a driver that learns by reward: smaller actions, as shares of the limits, give a zero command [-]."""
 
 _OWN_SCALES = np.array([scale for _, scale in DRIVER_FEATURES[len(FEATURES) :]])
 _SCALES = np.array([scale for _, scale in ALLOCATOR_FEATURES])
@@ -145,7 +145,7 @@ def view(task: str, observations: np.ndarray, scenes: np.ndarray, signals: np.nd
     return allocator_view(scenes, signals)
 
 
-def command(action: np.ndarray) -> np.ndarray:
+def command(action: np.ndarray, dead_zone: float = DEAD_ZONE) -> np.ndarray:
     """The driver's command, divided by its limits, for a policy's action; small actions give zero.
 
     ``sign(a) max(0, |a| - d) / (1 - d)`` with the dead zone d. The output of a network is never exactly zero, and would
@@ -153,8 +153,9 @@ def command(action: np.ndarray) -> np.ndarray:
 
     Args:
         action: action of the policy in [-1, 1], any shape.
+        dead_zone: d, in [0, 1); a policy's card says with which one it was trained.
     """
-    return np.sign(action) * np.maximum(np.abs(action) - DEAD_ZONE, 0.0) / (1.0 - DEAD_ZONE)
+    return np.sign(action) * np.maximum(np.abs(action) - dead_zone, 0.0) / (1.0 - dead_zone)
 
 
 def authority(action: np.ndarray) -> np.ndarray:

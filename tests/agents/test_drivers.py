@@ -182,7 +182,7 @@ def test_a_driver_sees_how_the_vehicle_ahead_grows(present, distance, relative_s
 def test_a_policy_that_asks_for_little_leaves_the_wheel_alone():
     weights = np.zeros((2, HISTORY * len(DRIVER_FEATURES)))
     little = np.full(2, 0.9 * DEAD_ZONE)
-    driver = LearnedDriver(Policy([(weights, little)], "tanh", False, {"task": "driver"}))
+    driver = LearnedDriver(Policy([(weights, little)], "tanh", False, {"task": "driver", "dead_zone": DEAD_ZONE}))
     observation, scene = np.zeros(25), np.zeros(1, SCENE)[0]
     np.testing.assert_array_equal(driver.act(observation, scene), [0.0, 0.0])
     envs = [make_environment(["SharedControl/LaneKeeping-v1"], "driver", 2, 0) for _ in range(2)]

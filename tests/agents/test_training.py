@@ -181,7 +181,7 @@ def test_a_folder_of_another_training_is_refused(tmp_path):
     [
         ("features", ["the fault"], "the fault"),
         ("history", 7, "history of 7"),
-        ("dead_zone", 0.5, "dead zone of 0.5; now it is 0.06"),
+        ("dead_zone", 1.5, r"dead_zone = 1.5 in its card must be a number in \[0, 1\)"),
         ("environments", ["SharedControl/LaneKeeping-v9"], "LaneKeeping-v9, which is not registered.*LaneKeeping-v1"),
     ],
 )

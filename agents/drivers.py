@@ -14,6 +14,7 @@ from shared_control_env.controllers.allocators import Allocator
 from shared_control_env.controllers.driver import Driver
 from shared_control_env.controllers.recorded import RecordedDriver
 from shared_control_env.evaluation.catalogue import AUTHORITIES, DRIVERS, AuthorityEntry, DriverEntry, choose_one
+from shared_control_env.learned.card import is_direct
 from shared_control_env.learned.policy import LearnedAllocator, LearnedDriver, Policy
 from shared_control_env.learned.shipped import shipped
 from shared_control_env.recordings.trial import Trial
@@ -94,7 +95,8 @@ def driver_entry(source: str, trusted: bool = False) -> DriverEntry:
         )
     if path.suffix in READERS:
         make = _read("driver", path, READERS[path.suffix])
-        config = {"driver_lag": {"direct": True}} if path.suffix == ".parquet" else {}
+        direct = path.suffix == ".parquet" or (path.suffix == ".npz" and is_direct(Policy.load(path).card))
+        config = {"driver_lag": {"direct": True}} if direct else {}
         mark = _digest(path) if path.suffix == ".zip" else None
         return DriverEntry(f"of {path.name}", make, config, fingerprint=mark)
     known: dict[str, Any] = {**DRIVERS, **dict.fromkeys(shipped("driver"))}

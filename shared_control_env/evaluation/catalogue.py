@@ -95,7 +95,7 @@ def _lag(name: str) -> dict[str, Any]:
     return {"driver_lag": {"K_h": lag.K_h, "T_h": lag.T_h}}
 
 
-_ARMS = tuple(
+ARMS = tuple(
     {"setting": f"driver_lag.{field}", "median": median, "spread": spread}
     for field, (median, spread) in zip(("K_h", "T_h"), fitted_arms(), strict=True)
 )
@@ -106,7 +106,7 @@ def _person(name: str, description: str) -> DriverEntry:
     """Entry for a person of :data:`core.parameters.PERSONS`. The arm is drawn around the five of the paper."""
     person, default = PERSONS[name]._asdict(), PersonParameters()._asdict()
     differing = {field: value for field, value in person.items() if value != default[field]}
-    return DriverEntry(description, config={"internal_model": {"active": True}, "person": differing}, draws=_ARMS)
+    return DriverEntry(description, config={"internal_model": {"active": True}, "person": differing}, draws=ARMS)
 
 
 DRIVERS: dict[str, DriverEntry] = {
@@ -127,7 +127,7 @@ DRIVERS: dict[str, DriverEntry] = {
     "population": DriverEntry(
         "one of these three in each episode, with a delay of perception of 0.15 to 0.25 s",
         config={"internal_model": {"active": True}, "persons": list(PERSONS)},
-        draws=(*_ARMS, {"setting": "person.delay", "low": 0.15, "high": 0.25}),
+        draws=(*ARMS, {"setting": "person.delay", "low": 0.15, "high": 0.25}),
     ),
     "scripted": DriverEntry("Stanley's law, speed and distance by the Intelligent Driver Model", ScriptedDriver),
     "distracted": DriverEntry("lets go until 1 s after the authority falls, then recovers", DistractedDriver),

@@ -60,6 +60,19 @@ class History:
         return _seen(np.concatenate([observation[None], self._last[i, :-1]])[None])[0]
 
 
+def of_episode(observations: np.ndarray) -> np.ndarray:
+    """What a policy sees in each step of one episode.
+
+    Args:
+        observations: observations of the episode, shape (T, size).
+
+    Returns:
+        Array of shape (T, HISTORY * size), as :meth:`History.push` returns it step by step.
+    """
+    steps = np.arange(len(observations))[:, None] - np.arange(HISTORY)
+    return _seen(observations[np.maximum(steps, 0)])
+
+
 def _seen(last: np.ndarray) -> np.ndarray:
     """The newest observation and the changes, the newest first, flattened."""
     return np.concatenate([last[:, :1], last[:, :-1] - last[:, 1:]], axis=1).reshape(len(last), -1)

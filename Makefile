@@ -3,9 +3,10 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 RLLIB = $(VENV)-rllib
+OFFLINE = $(VENV)-offline
 PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
-.PHONY: help install reproduce reference benchmark sensitivity studies policies test rllib lint types golden hooks pythons bench figures clean
+.PHONY: help install reproduce reference benchmark sensitivity studies policies test rllib offline lint types golden hooks pythons bench figures clean
 
 help:
 	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
@@ -18,6 +19,7 @@ help:
 	@echo "make hooks      have git run lint, types and golden rollouts before every commit"
 	@echo "make pythons    the tests on every promised Python that this machine has"
 	@echo "make rllib      the tests of training on Ray, in a virtual environment of their own"
+	@echo "make offline    the tests of offline learning with d3rlpy, in a virtual environment of their own"
 	@echo "make policies   train the policies that ship, compare them, and write them and their card to the package"
 	@echo "make bench      speed, as ratios against highway-env and SciPy in the same run"
 	@echo "make figures    copy the README's pictures from results/paper"
@@ -86,6 +88,18 @@ $(RLLIB)/.rllib: pyproject.toml constraints.txt
 rllib: $(RLLIB)/.rllib
 	$(RLLIB)/bin/python -m pytest -q tests/agents/test_rllib.py $(ARGS)
 
+# d3rlpy pins a Gymnasium that is older than the oldest that the environments run on: only what reads a dataset and
+# writes a policy is used there.
+$(OFFLINE)/.offline: pyproject.toml Makefile
+	$(PYTHON) -m venv $(OFFLINE)
+	$(OFFLINE)/bin/python -m pip --disable-pip-version-check --quiet install "torch==2.13.0" \
+		"d3rlpy==2.8.1" "minari>=0.5.3" h5py pillow numba osqp pydantic scipy shapely typer pytest
+	$(OFFLINE)/bin/python -m pip --disable-pip-version-check --quiet install --no-deps -e .
+	@touch $@
+
+offline: $(OFFLINE)/.offline
+	$(OFFLINE)/bin/python -m pytest -q --noconftest -W ignore tests/agents/test_offline.py $(ARGS)
+
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks $(ARGS)
 
@@ -94,4 +108,4 @@ figures: reproduce
 	cp results/paper/case1_path.png results/paper/case2_path.png docs/
 
 clean:
-	rm -rf $(VENV) $(RLLIB)
+	rm -rf $(VENV) $(RLLIB) $(OFFLINE)

@@ -9,14 +9,11 @@ import numpy as np
 
 from shared_control_env.core.faults.kinds import KINDS
 from shared_control_env.core.parameters import PERSONS, Limits, PersonParameters
-from shared_control_env.core.records import SPEED
-from shared_control_env.core.world.road import WIDTH
 from shared_control_env.envs.degradations import draw_degradation
-from shared_control_env.envs.recorded.replay import files_in, replay_of, usable
+from shared_control_env.envs.recorded.replay import decided_by, files_in, replay_of, usable
 from shared_control_env.envs.settings import CUT_OFF, RandomSettings, Settings, check, plain
 from shared_control_env.envs.settings.changes import at
 from shared_control_env.envs.settings.checks import RESTING
-from shared_control_env.envs.starts import steps_of
 
 
 def is_random(settings: Settings) -> bool:
@@ -89,16 +86,9 @@ def _draw_recording(config: dict[str, Any], settings: Settings, rng: np.random.G
     which = int(rng.integers(max(len(names), 1)))  # drawn for a given ego too, so that later draws do not depend on it
     ego = names[which] if settings.recording.ego is None else settings.recording.ego
     config["recording"] = {"file": str(file), "ego": ego, "drawn": True}
-    replay = replay_of(file, ego, 1.0 / settings.simulation_frequency, steps_of(settings))
-    width = float(np.median(replay.line[:, WIDTH]))
-    config["road"] = {
-        "segments": [{"length": replay.road_end, "curvature": 0.0}],
-        "lanes": replay.lanes,
-        "lane_width": width,
-    }
-    config["ego"] = {"lane": 0, "speed": float(replay.ego[SPEED]), "lateral_offset": 0.0}
-    if replay.body is not None:
-        config["vehicle"]["length"], config["vehicle"]["width"] = replay.body
+    replay = replay_of(file, ego, 1.0 / settings.simulation_frequency, settings.simulation_steps)
+    for section, values in decided_by(replay).items():
+        config[section].update(values)
 
 
 def _concerns_driver(entry: RandomSettings) -> bool:

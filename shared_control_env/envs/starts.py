@@ -76,15 +76,6 @@ def start_of(settings: Settings) -> Start:
     return Start(line, fault_records(settings), pack(parameters_of(settings)), ego, traffic, plan_records(settings))
 
 
-def steps_of(settings: Settings) -> int:
-    """Number of simulation steps of an episode.
-
-    Args:
-        settings: settings of the environment.
-    """
-    return settings.steps * (settings.simulation_frequency // settings.policy_frequency)
-
-
 def recorded(settings: Settings) -> Replay:
     """The replay of an episode with recorded traffic.
 
@@ -94,7 +85,7 @@ def recorded(settings: Settings) -> Replay:
     assert settings.recording is not None
     assert settings.recording.ego is not None
     dt = 1.0 / settings.simulation_frequency
-    return replay_of(Path(settings.recording.file), settings.recording.ego, dt, steps_of(settings))
+    return replay_of(Path(settings.recording.file), settings.recording.ego, dt, settings.simulation_steps)
 
 
 def count_vehicles(settings: Settings) -> int:

@@ -89,8 +89,8 @@ def test_single_and_vectorised_are_the_same_and_copies_go_on(file):
         ("t,value\n0,0\n1,1\n1,2\n", "t does not increase after row 2"),
         ("t,value\n0,0\n1,much\n", "'much' in row 2 is no number"),
         ("t,value\n0,0\n1\n", "None in row 2 is no number"),
-        ("time,value\n0,0\n1,1\n", "has no column 't'"),
-        ("", "has no column 't'"),
+        ("time,value\n0,0\n1,1\n", "has no column t;"),
+        ("", "has no column t, value;"),
         ("t,value\n0,0\n1,0.1\n", "lasts 1 s, and the fault acts for 9 s"),
     ],
 )

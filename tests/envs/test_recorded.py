@@ -17,6 +17,7 @@ from shared_control_env.envs.recorded.replay import files_in, read, replay_of, u
 from shared_control_env.envs.recorded.road import road_along
 from shared_control_env.envs.recorded.smoothing import motion, smoothed
 from shared_control_env.envs.recorded.tracks import read_tracks
+from shared_control_env.envs.settings import plain
 from shared_control_env.wrappers import DriverModel
 
 ID = "SharedControl/Recorded-v1"
@@ -145,7 +146,7 @@ def test_wrong_tables(tmp_path):
     for i, (table, old, new, said) in enumerate(
         (
             ("tracks", "heading", "yaw", "has no column heading"),
-            ("tracks", "4.6,1.9", "4.6,wide", "width in row"),
+            ("tracks", "4.6,1.9", "4.6,wide", "width = 'wide' in row 1 is no number"),
             ("tracks", "4.6,1.9", "4.7,1.9", "vehicle 1 changes its length"),
             ("lanes", "0,left", "0,middle", "side left or right"),
             ("lanes", "2,", "5,", "numbered from 0"),
@@ -177,6 +178,19 @@ def test_what_the_recording_decides_cannot_be_set():
     ):
         with pytest.raises(ValueError, match=f"{said}.* would not act"):
             gym.make(ID, config=config)
+
+
+def test_an_episode_that_was_drawn_begins_as_its_recording_says():
+    """The settings of an episode make the same episode again; with another start they are refused."""
+    first = gym.make(ID, config={"duration": 2.0})
+    observation, _ = first.reset(seed=3)
+    config = plain(first.unwrapped.episode)
+    np.testing.assert_array_equal(gym.make(ID, config=config).reset(seed=0)[0], observation)
+    for section, change in (("ego", {"speed": 1.0}), ("road", {"lanes": 1}), ("vehicle", {"width": 1.0})):
+        with pytest.raises(ValueError, match=f"'{section}'.* would not act"):
+            gym.make(ID, config={**config, section: {**config[section], **change}})
+    with pytest.raises(ValueError, match="set by the environment"):
+        gym.make(ID, config={"recording": {"file": "example", "drawn": True}})
 
 
 @pytest.mark.parametrize("setting", ["ego.speed", "vehicle.length", "road.lane_width"])

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shared_control_env.core.parameters import TrafficParameters
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, SPEED, YAW_RATE, X, Y, pack, record_dtype
 from shared_control_env.core.world.replay import AWAY, TRACK_COLUMNS
-from shared_control_env.core.world.road import S0, locate
+from shared_control_env.core.world.road import S0, WIDTH, locate
 from shared_control_env.envs.recorded.commonroad import read_commonroad
 from shared_control_env.envs.recorded.recording import Recording
 from shared_control_env.envs.recorded.road import lane_at, road_along
 from shared_control_env.envs.recorded.smoothing import motion
 from shared_control_env.envs.recorded.tracks import TRACKS, read_tracks
+from shared_control_env.envs.tables import version_of
 
 SLOWEST = 2.0
 """Smallest speed that a vehicle wants that has left its track [m/s]."""
@@ -84,15 +85,7 @@ def read(path: Path) -> Recording:
     Raises:
         ValueError: for a file that is none, or wrong in itself.
     """
-    return _read(*_version(path))
-
-
-def _version(path: Path) -> tuple[Path, int, int]:
-    """A file as it is now: path, time of its last change and size. What is read is kept by these."""
-    if not path.is_file():
-        raise ValueError(f"{path}: there is no such file")
-    stat = path.stat()
-    return path, stat.st_mtime_ns, stat.st_size
+    return _read(*version_of(path))
 
 
 @lru_cache(maxsize=64)
@@ -111,7 +104,7 @@ def usable(path: Path, duration: float) -> tuple[str, ...]:
         path: the recording.
         duration: duration of an episode [s].
     """
-    return _usable(*_version(path), duration)
+    return _usable(*version_of(path), duration)
 
 
 @lru_cache(maxsize=256)
@@ -148,7 +141,7 @@ def replay_of(path: Path, ego: str, dt: float, steps: int) -> Replay:
     Raises:
         ValueError: for an id that is not there, or an ego on no lane.
     """
-    return _made(*_version(path), ego, dt, steps)
+    return _made(*version_of(path), ego, dt, steps)
 
 
 @cache
@@ -202,6 +195,23 @@ def _made(path: Path, changed: int, size: int, ego: str, dt: float, steps: int) 
         traffic[i, [BODY_LENGTH, BODY_WIDTH]] = track.length, track.width
     state = np.array([pose[X], pose[Y], pose[HEADING], pose[SPEED], 0.0, pose[YAW_RATE]])
     return Replay(line, state, body, traffic, plans, tracks, human, human_steps, road.end - s_ego - END, road.lanes)
+
+
+def decided_by(replay: Replay) -> dict[str, dict[str, Any]]:
+    """Settings of an episode that a recording decides, by section.
+
+    Args:
+        replay: the recording with its ego.
+    """
+    width = float(np.median(replay.line[:, WIDTH]))
+    segments = [{"length": replay.road_end, "curvature": 0.0}]
+    decided: dict[str, dict[str, Any]] = {
+        "road": {"segments": segments, "lanes": replay.lanes, "lane_width": width},
+        "ego": {"lane": 0, "speed": float(replay.ego[SPEED]), "lateral_offset": 0.0},
+    }
+    if replay.body is not None:
+        decided["vehicle"] = dict(zip(("length", "width"), replay.body, strict=True))
+    return decided
 
 
 def _within(recording: Recording, name: str, times: np.ndarray) -> np.ndarray:

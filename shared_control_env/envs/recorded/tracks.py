@@ -8,15 +8,13 @@ which is 0, to the left.
 
 from __future__ import annotations
 
-import csv
 from collections import defaultdict
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from shared_control_env.envs.recorded.recording import Lane, Recording, Track, check
+from shared_control_env.envs.tables import numbers, read_table
 
 TRACKS, LANES = (".tracks.csv", ".tracks.parquet"), ".lanes.csv"
 """Ends of the names of the two files."""
@@ -39,12 +37,14 @@ def read_tracks(path: Path) -> Recording:
     """
     end = next(end for end in TRACKS if path.name.endswith(end))
     lanes = path.with_name(path.name.removesuffix(end) + LANES)
-    found: dict[str, list[list[float]]] = defaultdict(list)
-    for i, row in enumerate(_rows(path, COLUMNS)):
-        found[str(row["id"])].append([_number(row[name], f"{path}: {name} in row {i + 1}") for name in COLUMNS[1:]])
+    table = read_table(path, COLUMNS, LARGEST)
+    columns = np.array([numbers(path, table, name) for name in COLUMNS[1:]])
+    rows: dict[str, list[int]] = defaultdict(list)
+    for i, name in enumerate(table["id"]):
+        rows[str(name)].append(i)
     tracks = {}
-    for name, rows in found.items():
-        t, x, y, heading, length, width = np.array(rows).T
+    for name, own in rows.items():
+        t, x, y, heading, length, width = columns[:, own]
         if np.ptp(length) > 0.0 or np.ptp(width) > 0.0:
             raise ValueError(f"{path}: vehicle {name} changes its length or width")
         tracks[name] = Track(float(length[0]), float(width[0]), t, x, y, heading)
@@ -54,16 +54,16 @@ def read_tracks(path: Path) -> Recording:
 
 
 def _lanes(path: Path) -> dict[str, Lane]:
+    table = read_table(path, ("lane", "side", "x", "y"), LARGEST)
+    lane, x, y = (numbers(path, table, name) for name in ("lane", "x", "y"))
     borders: dict[int, dict[str, list[list[float]]]] = defaultdict(lambda: {"left": [], "right": []})
-    for i, row in enumerate(_rows(path, ("lane", "side", "x", "y"))):
-        label = f"{path}: row {i + 1}"
-        number = _number(row["lane"], f"{label}: lane")
-        if row["side"] not in ("left", "right") or number != int(number):
-            raise ValueError(f"{label}: lane must be a whole number, and side left or right")
-        borders[int(number)][row["side"]].append([_number(row[axis], f"{label}: {axis}") for axis in ("x", "y")])
-    numbers = sorted(borders)
-    if numbers != list(range(len(numbers))):
-        raise ValueError(f"{path}: the lanes are {numbers}; they must be numbered from 0, the rightmost, on")
+    for i, side in enumerate(table["side"]):
+        if side not in ("left", "right") or not lane[i].is_integer():
+            raise ValueError(f"{path}: row {i + 1}: lane must be a whole number, and side left or right")
+        borders[int(lane[i])][side].append([x[i], y[i]])
+    found = sorted(borders)
+    if found != list(range(len(found))):
+        raise ValueError(f"{path}: the lanes are {found}; they must be numbered from 0, the rightmost, on")
     return {
         str(number): Lane(
             np.array(borders[number]["left"]).reshape(-1, 2),
@@ -71,52 +71,5 @@ def _lanes(path: Path) -> dict[str, Lane]:
             str(number + 1) if number + 1 in borders else None,
             str(number - 1) if number > 0 else None,
         )
-        for number in numbers
+        for number in found
     }
-
-
-def _rows(path: Path, columns: tuple[str, ...]) -> Iterator[dict[str, Any]]:
-    """Rows of a table."""
-    try:
-        size = path.stat().st_size
-    except OSError as error:
-        raise ValueError(f"{path} cannot be read: {error.strerror or error}") from None
-    if size > LARGEST:
-        raise ValueError(f"{path} has {size} bytes; at most {LARGEST} are read")
-    if path.suffix == ".parquet":
-        yield from _parquet(path, columns)
-        return
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = csv.DictReader(file)
-            _check_columns(path, rows.fieldnames or (), columns)
-            yield from rows
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path} is no CSV file: {error}") from None
-
-
-def _parquet(path: Path, columns: tuple[str, ...]) -> Iterator[dict[str, Any]]:
-    try:
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-    except ImportError:
-        raise ValueError(f'{path}: Parquet needs the extra "benchmark"; a CSV file does not') from None
-    try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowException) as error:
-        raise ValueError(f"{path} is no Parquet file: {str(error).splitlines()[0]}") from None
-    _check_columns(path, table.column_names, columns)
-    yield from table.select(list(columns)).to_pylist()
-
-
-def _check_columns(path: Path, present: Any, columns: tuple[str, ...]) -> None:
-    missing = [name for name in columns if name not in present]
-    if missing:
-        raise ValueError(f"{path} has no column {', '.join(missing)}; it needs {', '.join(columns)}")
-
-
-def _number(value: Any, label: str) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{label} = {value!r} is no number") from None

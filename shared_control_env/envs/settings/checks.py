@@ -6,6 +6,7 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -14,7 +15,7 @@ from shared_control_env.core import parameters as core
 from shared_control_env.core.faults.kinds import FACTOR, KINDS, LENGTH, RATE, SHARE, TIME, Kind
 from shared_control_env.core.records import MAX_DELAY
 from shared_control_env.envs.profiles import length_of
-from shared_control_env.envs.recorded.replay import files_in, read, usable
+from shared_control_env.envs.recorded.replay import decided_by, files_in, read, replay_of, usable
 from shared_control_env.envs.settings.changes import at, change, merge
 from shared_control_env.envs.settings.schema import OWN_TRAFFIC, FaultSettings, RandomSettings, Settings, plain
 from shared_control_env.nearest import hint, nearest
@@ -181,6 +182,7 @@ def _check_recording(settings: Settings) -> None:
     except ValueError as error:
         raise ValueError(f"config['recording']: {error}") from None
     if recording.drawn:
+        _check_drawn_recording(settings)
         return
     default = Settings()
     for field in DECIDED:
@@ -193,6 +195,22 @@ def _check_recording(settings: Settings) -> None:
             f"config['other_vehicles_type'] = {settings.other_vehicles_type!r} would not act: recorded vehicles have "
             "tracks"
         )
+
+
+def _check_drawn_recording(settings: Settings) -> None:
+    """Check that the settings of one episode are those that its recording decides."""
+    recording = settings.recording
+    assert recording is not None
+    if recording.ego is None or not Path(recording.file).is_file():
+        raise ValueError("config['recording']['drawn'] = True is set by the environment, with one file and its ego")
+    dt = 1.0 / settings.simulation_frequency
+    decided = decided_by(replay_of(Path(recording.file), recording.ego, dt, settings.simulation_steps))
+    config, default = plain(settings), plain(Settings())
+    wanted = {name: default[name] for name in DECIDED}
+    wanted |= {name: {**config[name], **values} for name, values in decided.items()}
+    for name, value in wanted.items():
+        if config[name] != value:
+            raise ValueError(f"config[{name!r}] would not act: the recording in config['recording'] decides it")
 
 
 def _check_faults(settings: Settings) -> None:

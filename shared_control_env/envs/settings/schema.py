@@ -332,6 +332,11 @@ class Settings(Section):
         return round(self.duration * self.policy_frequency)
 
     @property
+    def simulation_steps(self) -> int:
+        """Length of an episode as a number of simulation steps."""
+        return self.steps * (self.simulation_frequency // self.policy_frequency)
+
+    @property
     def is_direct(self) -> bool:
         """Whether the driver's slot takes u_h,act itself."""
         return bool(self.driver_lag.direct)

@@ -73,7 +73,9 @@ def pack(parameters: NamedTuple) -> np.ndarray:
     Args:
         parameters: named tuple, such as :class:`core.parameters.Parameters`.
     """
-    return np.array(_plain(parameters), dtype=record_dtype(type(parameters)))
+    record = np.zeros((), dtype=record_dtype(type(parameters)))  # zeros between the fields too, so that bytes compare
+    record[()] = _plain(parameters)
+    return record
 
 
 def _plain(value: object) -> object:

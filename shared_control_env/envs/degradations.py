@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shared_control_env.core.drawing import between
 from shared_control_env.core.faults.kinds import CHANNELS, KINDS
 from shared_control_env.core.parameters import Limits
 from shared_control_env.nearest import check_new_name, hint
@@ -125,30 +126,52 @@ def draw_degradation(name: str, limits: Limits, rng: np.random.Generator) -> lis
     Returns:
         Entries for ``config["faults"]``; an empty list for ``"none"``.
     """
-    which, size, sign, onset, ramp, duration, period = rng.random(7).tolist()
+    shares = rng.random(7)
     seed = int(rng.integers(2**31))
     entry = DEGRADATIONS[name]
     if entry is None:
         return []
-    channel = entry.channels[int(which * len(entry.channels))]
+    return [fault_of(entry, entry.channels[int(shares[0] * len(entry.channels))], limits, shares, seed)]
+
+
+def fault_of(entry: Degradation, channel: str, limits: Limits, shares: np.ndarray, seed: int) -> dict[str, Any]:
+    """The fault settings of a degradation; :mod:`core.drawing` makes the same records of the same draws.
+
+    Args:
+        entry: the degradation.
+        channel: one of its channels.
+        limits: limits of the commands.
+        shares: shares of the way between the ends, of which the first has chosen the channel, shape (7,): then size,
+            sign, onset, ramp, duration and period [-].
+        seed: seed of noise.
+    """
+    _, size, sign, onset, ramp, duration, period = shares.tolist()
     fault: dict[str, Any] = {
         "kind": entry.kind,
         "channel": channel,
-        "onset": _between(entry.onset, onset),
-        "ramp": _between(entry.ramp, ramp),
-        "period": _between(entry.period, period),
+        "onset": between(*entry.onset, onset),
+        "ramp": between(*entry.ramp, ramp),
+        "period": between(*entry.period, period),
     }
     if KINDS[entry.kind].draws:
         fault["seed"] = seed
     if entry.size is not None:
-        bound = limits.a_max if channel == "acceleration" else limits.delta_max
-        fault["size"] = _between(entry.size, size) * (bound if entry.of_limit else 1.0)
+        fault["size"] = between(*entry.size, size) * bound_of(entry, channel, limits)
         if entry.signed and sign < 0.5:
             fault["size"] = -fault["size"]
     if entry.duration is not None:
-        fault["duration"] = _between(entry.duration, duration)
-    return [fault]
+        fault["duration"] = between(*entry.duration, duration)
+    return fault
 
 
-def _between(ends: Range, share: float) -> float:
-    return ends[0] + (ends[1] - ends[0]) * share
+def bound_of(entry: Degradation, channel: str, limits: Limits) -> float:
+    """Unit of a degradation's size: the limit of its channel where it is a share of that, else 1.
+
+    Args:
+        entry: the degradation.
+        channel: one of its channels.
+        limits: limits of the commands.
+    """
+    if not entry.of_limit:
+        return 1.0
+    return limits.a_max if channel == "acceleration" else limits.delta_max

@@ -9,18 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shared_control_env.core.batch import Batch, Sizes, Starts, empty_starts
-from shared_control_env.core.parameters import TRAFFIC_BODY
-from shared_control_env.core.records import (
-    BODY_LENGTH,
-    BODY_WIDTH,
-    SPEED,
-    X,
-    Y,
-    pack,
-)
+from shared_control_env.core.records import X, Y, pack
 from shared_control_env.core.world.replay import AWAY
-from shared_control_env.core.world.road import S0, curvature_at, point_at, reference_line
-from shared_control_env.core.world.traffic import follow_lane
+from shared_control_env.core.world.road import COLUMNS, S0, pieces_of
+from shared_control_env.core.world.start import place
 from shared_control_env.envs.recorded.replay import Replay, files_in, read, replay_of
 from shared_control_env.envs.recorded.road import most_rows
 from shared_control_env.envs.settings import LEAD_IN, Settings, fault_records, parameters_of, plan_records
@@ -47,7 +39,7 @@ class Start(NamedTuple):
 
 
 def start_of(settings: Settings) -> Start:
-    """The start that the settings describe: the ego is at s = 0 and turns with the road.
+    """The start that the settings describe.
 
     Args:
         settings: settings of one episode, after all random draws.
@@ -62,18 +54,26 @@ def start_of(settings: Settings) -> Start:
             replay.traffic,
             replay.plans,
         )
-    road = settings.road
-    line = reference_line([(s.length, s.curvature) for s in road.segments], LEAD_IN, road.lane_width, road.lanes)
-    d = settings.lane_centre(settings.ego.lane) + settings.ego.lateral_offset
-    x, y, psi = point_at(line, 0.0, d)
-    speed = settings.ego.speed
-    ego = np.array([x, y, psi, speed, 0.0, speed * curvature_at(line, 0.0, d)])
-    traffic = np.zeros((len(settings.vehicles), 8))
-    for row, vehicle in zip(traffic, settings.vehicles, strict=True):
-        row[:3] = point_at(line, vehicle.position, settings.lane_centre(vehicle.lane))
-        row[SPEED], row[BODY_LENGTH], row[BODY_WIDTH] = vehicle.speed, *TRAFFIC_BODY
-        follow_lane(row, line, 0.0, 0.0)
+    numbers = numbers_of(settings)
+    segments = 1 + len(settings.road.segments)
+    line = np.empty((sum(pieces_of(s.length, s.curvature) for s in settings.road.segments) + 1, COLUMNS))
+    ego, traffic = np.empty(6), np.empty((len(settings.vehicles), 8))
+    place(numbers, segments, line, ego, traffic)
     return Start(line, fault_records(settings), pack(parameters_of(settings)), ego, traffic, plan_records(settings))
+
+
+def numbers_of(settings: Settings) -> np.ndarray:
+    """The numbers of a start, from which :func:`core.world.start.place` places everything.
+
+    Args:
+        settings: settings of one episode, after all random draws.
+    """
+    road, ego = settings.road, settings.ego
+    values = [road.lane_width, road.lanes, settings.lane_centre(ego.lane), ego.lateral_offset, ego.speed, LEAD_IN, 0.0]
+    values += [value for segment in road.segments for value in (segment.length, segment.curvature)]
+    for vehicle in settings.vehicles:
+        values += [settings.lane_centre(vehicle.lane), vehicle.position, vehicle.speed]
+    return np.array(values, dtype=float)
 
 
 def recorded(settings: Settings) -> Replay:
@@ -129,6 +129,15 @@ def _most_rows(settings: Settings) -> int:
     if any(entry.setting.startswith("road") for entry in settings.randomise):
         return 1 + len(settings.road.segments) + 4
     return len(start_of(settings).line)
+
+
+def sizes_of(batch: Batch) -> Sizes:
+    """Sizes that a batch has room for.
+
+    Args:
+        batch: state of the environments.
+    """
+    return Sizes(batch.faults.shape[1], batch.lines.shape[1], batch.traffic.shape[1])
 
 
 def enlarged(batch: Batch, sizes: Sizes) -> Batch:

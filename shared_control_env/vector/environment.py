@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium import logger
 from gymnasium.error import ClosedEnvironmentError
-from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -34,11 +33,19 @@ from shared_control_env.core.feedback.info import as_batch
 from shared_control_env.core.feedback.observation import OBSERVATIONS
 from shared_control_env.core.loading import load
 from shared_control_env.envs import settings as configuration
-from shared_control_env.envs.episode import draw_episode, is_random
+from shared_control_env.envs.episode import is_random
 from shared_control_env.envs.scenarios import ENTRY, SCENARIOS, Scenario
 from shared_control_env.envs.settings import Settings
 from shared_control_env.envs.slots import AUTHORITY, DRIVER, NOT_DIRECT, SLOT_SPACES, observation_space, space_of
-from shared_control_env.envs.starts import enlarged, has_left, refresh_addresses, sizes_for, start_of, write_start
+from shared_control_env.envs.starts import (
+    enlarged,
+    has_left,
+    refresh_addresses,
+    sizes_for,
+    sizes_of,
+    start_of,
+    write_start,
+)
 from shared_control_env.vector.checks import (
     Actions,
     OpenSlots,
@@ -50,6 +57,7 @@ from shared_control_env.vector.checks import (
     checked_mode,
     settings_for_kernel,
 )
+from shared_control_env.vector.episodes import Episodes
 from shared_control_env.vector.pictures import Pictures
 from shared_control_env.vector.threads import Threads
 
@@ -139,8 +147,7 @@ class SharedControlVectorEnv(VectorEnv):
         self._programs = np.zeros(self._threads.count, PROGRAM)
         self._pictures = Pictures(render_mode, n)
         self._everyone = np.ones(n, dtype=bool)
-        self._seeds: list[int | None] = [None] * n
-        self._generators: list[np.random.Generator | None] = [None] * n
+        self._episodes = Episodes(n)
         self._calls = NOT_LOADED
         self._adopt(settings, [settings] * n)
 
@@ -156,15 +163,15 @@ class SharedControlVectorEnv(VectorEnv):
     def _adopt(self, settings: Settings, templates: list[Settings]) -> None:
         """Adopt common settings and those of each environment. All environments need a reset afterwards."""
         n = self.num_envs
-        self._settings, self._templates = settings, templates
+        self._settings = settings
         self._started = False
         self.metadata["render_fps"] = settings.policy_frequency
         self._pictures.restart(settings.steps)
-        self._random = any(template is not settings or is_random(template) for template in templates)
-        self._episodes = [settings] * n
+        random = any(template is not settings or is_random(template) for template in templates)
         sizes = sizes_for(templates)
-        starts = empty_starts(0 if self._random else 1, sizes)
-        if not self._random:
+        self._episodes.adopt(templates, random, sizes, settings)
+        starts = empty_starts(0 if random else 1, sizes)
+        if not random:
             write_start(start_of(settings), starts, 0)
         self._setup = Setup(
             starts=starts,
@@ -184,6 +191,7 @@ class SharedControlVectorEnv(VectorEnv):
         """Restore pickled or copied environments, with the function addresses of this process."""
         self.__dict__.update(state)
         refresh_addresses(self._episodes, self._batch)
+        self._episodes.tabulate(sizes_for(self._episodes.templates))
         refresh_addresses(self._episodes[: len(self._setup.starts.parameters)], self._setup.starts)
         if self._started:
             self._load()
@@ -239,13 +247,13 @@ class SharedControlVectorEnv(VectorEnv):
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """Seed of each environment; a random seed if none was given."""
         for i in range(self.num_envs):
-            self._generator(i)
-        return tuple(seed for seed in self._seeds if seed is not None)
+            self._episodes.generator(i)
+        return tuple(seed for seed in self._episodes.seeds if seed is not None)
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """Generator of each environment."""
-        return tuple(self._generator(i) for i in range(self.num_envs))
+        return tuple(self._episodes.generator(i) for i in range(self.num_envs))
 
     @property
     def bytes_per_environment(self) -> int:
@@ -287,7 +295,7 @@ class SharedControlVectorEnv(VectorEnv):
             )
         if config is not None and not mask.all():
             raise ValueError("options['config'] changes all environments; it does not go with a partial 'reset_mask'")
-        changed = None if config is None else changed_settings(config, self._settings, self._templates)
+        changed = None if config is None else changed_settings(config, self._settings, self._episodes.templates)
         generators = checked_generators(seed, self.num_envs)
         if changed is not None:
             self._check_driver([changed[0], *changed[1]])
@@ -295,7 +303,7 @@ class SharedControlVectorEnv(VectorEnv):
         for i in np.flatnonzero(mask).tolist():
             seeded = generators[i]
             if seeded is not None:
-                self._generators[i], self._seeds[i] = seeded
+                self._episodes.seed(i, *seeded)
         out = self._outputs()
         if self._started:  # Environments outside the mask keep their last observation.
             out.observations[:] = self._observations
@@ -358,7 +366,7 @@ class SharedControlVectorEnv(VectorEnv):
         steps = checked_count("steps", steps)
         out = self._outputs()
         same_step, drawn = self._mode is AutoresetMode.SAME_STEP, self.render_mode is not None
-        one_by_one = self._random or self._user_allocates or drawn or same_step
+        one_by_one = self._episodes.random or self._user_allocates or drawn or same_step
         piece = 1 if one_by_one else max(1, AT_ONCE // self.num_envs)
         taken = []
         for first in range(0, steps, piece):
@@ -427,29 +435,21 @@ class SharedControlVectorEnv(VectorEnv):
         Raises:
             ValueError: for wrong settings, or for shared settings that need a :meth:`reset`.
         """
-        settings, templates = changed_settings(config, self._settings, self._templates)
+        settings, templates = changed_settings(config, self._settings, self._episodes.templates)
         check_shared_settings(settings, self._settings)
         self._check_driver([settings, *templates])
         if not self._started:
             self._adopt(settings, templates)
             return
-        self._settings, self._templates, self._random = settings, templates, True
-        sizes = sizes_for(templates)
+        self._settings, sizes = settings, sizes_for(templates)
         self._batch = enlarged(self._batch, sizes)
+        self._episodes.adopt(templates, True, sizes_of(self._batch), None)
         self._setup = self._setup._replace(starts=empty_starts(0, sizes))
 
     def _load(self) -> None:
         """Compile everything that a step runs, or read it from numba's cache."""
         self._calls = load(self._driver, self._allocate, self._observation)
         self._setup = self._setup._replace(calls=self._calls)
-
-    def _generator(self, i: int) -> np.random.Generator:
-        """Generator of environment i, seeded at random if no seed was given."""
-        generator = self._generators[i]
-        if generator is None:
-            generator, self._seeds[i] = seeding.np_random(None)
-            self._generators[i] = generator
-        return generator
 
     def _begin(self, mask: np.ndarray, out: Outputs) -> None:
         """Begin an episode in each environment of the mask."""
@@ -458,14 +458,10 @@ class SharedControlVectorEnv(VectorEnv):
 
     def _draw(self, mask: np.ndarray) -> None:
         """Draw an episode for each environment of the mask if anything is random. A failed draw changes no episode."""
-        drawn = {}
-        if self._random:
-            drawn = {i: draw_episode(self._templates[i], self._generator(i)) for i in np.flatnonzero(mask).tolist()}
+        if self._episodes.random:
+            self._episodes.draw(mask, self._batch, self._threads)
         self._open.clipping.clear(mask)
-        self._batch.ended[mask] = True  # the kernel then begins these episodes even after an interrupt in between
-        for i, episode in drawn.items():
-            self._episodes[i] = episode
-            write_start(start_of(episode), self._batch, i)
+        self._batch.ended[mask] = True
 
     def _drive(self, steps: int, actions: Actions, out: Outputs) -> tuple[Rollout, Outputs | None]:
         """Step all environments. ``steps`` must be 1 if episodes are drawn or the autoreset mode is ``same_step``.

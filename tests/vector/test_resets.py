@@ -6,13 +6,13 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import shared_control_env  # noqa: F401
-from shared_control_env.envs.starts import write_start
-from shared_control_env.vector import environment
+from shared_control_env.vector import episodes
 from tests.vector.agreement import assert_same_info, at, compare, gentle_driver
 
 TWO_LANE = "SharedControl/TwoLane-v1"
 LANE_CHANGE = "SharedControl/LaneChange-v1"
 SPEEDS = {"randomise": [{"setting": "ego.speed", "low": 8.0, "high": 16.0}]}
+IN_PYTHON = {"setting": "road.segments.0.length", "low": 900.0, "high": 1000.0}
 IMPOSSIBLE = {"randomise": [{"setting": "ego.lateral_offset", "choices": [0.1, 9.0]}], "faults": []}
 
 
@@ -212,21 +212,18 @@ def test_a_collision_does_not_outlive_its_episode():
 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
-def test_an_interrupted_reset_is_not_driven_on(mode, monkeypatch):
-    env = gym.make_vec(LANE_CHANGE, num_envs=4, autoreset_mode=mode)
+@pytest.mark.parametrize(("name", "config"), [("draw_starts", {}), ("write_start", {"randomise": [IN_PYTHON]})])
+def test_an_interrupted_reset_is_not_driven_on(mode, name, config, monkeypatch):
+    env = gym.make_vec(LANE_CHANGE, num_envs=4, autoreset_mode=mode, config=config)
     env.reset(seed=0)
     for _ in range(10):
         env.step(np.zeros((4, 2)))
-    written = []
 
-    def interrupted(settings, starts, i):
-        if len(written) == 2:
-            raise KeyboardInterrupt
-        written.append(i)
-        write_start(settings, starts, i)
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(environment, "write_start", interrupted)
+        patch.setattr(episodes, name, interrupted)
         with pytest.raises(KeyboardInterrupt):
             env.reset(options={"reset_mask": np.array([True, False, True, True])})
     if mode is AutoresetMode.NEXT_STEP:

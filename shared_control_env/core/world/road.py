@@ -40,17 +40,50 @@ def reference_line(
     Returns:
         Reference line, shape (n, 12); arcs longer than :data:`MAX_ARC` are split.
     """
-    rows: list[list[float]] = []
-    s = x = -lead_in
-    y = psi = 0.0
-    sides = [lane_width, 0.0, -0.5 * lane_width, 0.0, lanes * lane_width - 0.5 * lane_width, 0.0]
-    for length, kappa in [(lead_in, 0.0), *segments] if lead_in else segments:
-        pieces = max(1, ceil(abs(kappa) * length / MAX_ARC))
+    chained = np.array([(lead_in, 0.0), *segments] if lead_in else segments)
+    line = np.empty((sum(pieces_of(length, kappa) for length, kappa in chained), COLUMNS))
+    chain(chained, -lead_in, lane_width, lanes, line)
+    return line
+
+
+@jit
+def pieces_of(length: float, kappa: float) -> int:
+    """Number of rows of a segment: arcs longer than :data:`MAX_ARC` are split.
+
+    Args:
+        length: length of the segment [m].
+        kappa: its curvature [1/m].
+    """
+    return max(1, ceil(abs(kappa) * length / MAX_ARC))
+
+
+@jit
+def chain(segments: np.ndarray, s: float, lane_width: float, lanes: int, line: np.ndarray) -> None:
+    """Write the reference line of a chain of segments; rows that are left over get an infinite ``s0``.
+
+    Args:
+        segments: length [m] and curvature [1/m] of each segment, shape (m, 2).
+        s: path length at which the first one starts; its x coordinate is the same [m].
+        lane_width: width of a lane [m].
+        lanes: number of lanes.
+        line: written, at least as many rows as the segments have pieces, shape (n, 12).
+    """
+    for i in range(line.shape[0]):
+        for j in range(COLUMNS):
+            line[i, j] = 0.0
+        line[i, S0] = np.inf
+    x, y, psi = s, 0.0, 0.0
+    n = 0
+    for i in range(segments.shape[0]):
+        kappa, pieces = segments[i, 1], pieces_of(segments[i, 0], segments[i, 1])
+        length = segments[i, 0] / pieces
         for _ in range(pieces):
-            rows.append([s, x, y, psi, kappa, length / pieces, *sides])
-            x, y, psi = point_at(np.array(rows), s + length / pieces, 0.0)
-            s += length / pieces
-    return np.array(rows)
+            row = line[n]
+            row[S0], row[X0], row[Y0], row[PSI0], row[KAPPA], row[LENGTH] = s, x, y, psi, kappa, length
+            row[WIDTH], row[RIGHT], row[LEFT] = lane_width, -0.5 * lane_width, lanes * lane_width - 0.5 * lane_width
+            x, y, psi = point_at(line, s + length, 0.0)
+            s += length
+            n += 1
 
 
 @jit

@@ -275,6 +275,10 @@ _Reward: Any = create_model(
 _Person = _section("_Person", core.PersonParameters, "seed", seed=(Seed | None, None))  # None for a random seed
 
 
+MOST_FAULTS = 20
+"""Largest number of degradations of an episode."""
+
+
 class Settings(Section):
     """All settings. The first group consists of highway-env's own settings, with the same meaning as there."""
 
@@ -295,7 +299,7 @@ class Settings(Section):
     lane_change: LaneChangeSettings | None = None  # of the ego; None to keep the lane
     recording: RecordingSettings | None = None  # recorded traffic; None for the vehicles below
     vehicles: Annotated[list[VehicleSettings], MaxLen(100)] = []
-    faults: Annotated[list[FaultSettings], MaxLen(20)] = []
+    faults: Annotated[list[FaultSettings], MaxLen(MOST_FAULTS)] = []
     fault_at: Literal[PLACES] = "command"  # where degradations of the command act (core.faults)
     misperception: Literal["automation", "shared"] = "automation"  # shared: also in the risk assessment
     degradations: list[name_in(DEGRADATIONS)] = []  # one of these is drawn at the start of each episode

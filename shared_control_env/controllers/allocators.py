@@ -164,6 +164,7 @@ class FuzzyAuthority(Stateless):
         if operators is not None and operators not in OPERATORS:
             raise ValueError(f"operators = {operators!r}; {hint(operators, OPERATORS)}, or None")
         self.operators = operators
+        self._index = OPERATORS.index(OPERATORS[0] if operators is None else operators)
         self.compiled = compiled_allocators.fuzzy_authority if operators is None else FUZZY[operators]
 
     def allocate(self, scene: np.ndarray, signals: np.ndarray) -> float:
@@ -173,8 +174,7 @@ class FuzzyAuthority(Stateless):
             scene: record of :data:`core.records.SCENE`; not used.
             signals: record of :data:`core.records.SIGNALS`; the risks ``r_x`` and ``r_y`` are used.
         """
-        operators = OPERATORS[0] if self.operators is None else self.operators
-        return authority(float(signals["r_x"]), float(signals["r_y"]), OPERATORS.index(operators))
+        return authority(float(signals["r_x"]), float(signals["r_y"]), self._index)
 
 
 class FixedAuthority(Stateless):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import deepcopy
 from typing import Any
 
@@ -17,12 +17,14 @@ from shared_control_env.core import kernel
 from shared_control_env.core.batch import (
     NOT_LOADED,
     WORK,
+    Outputs,
     Setup,
     Sizes,
     empty_batch,
     empty_starts,
     new_outputs,
 )
+from shared_control_env.core.compile.jit import compiled_form
 from shared_control_env.core.control.predictive_driver import PROGRAM
 from shared_control_env.core.feedback.info import INFO, as_dict
 from shared_control_env.core.feedback.observation import OBSERVATIONS
@@ -97,6 +99,7 @@ class SharedControlEnv(HighwayEnv):
         self._spec: Any = None
         self._works, self._programs = np.zeros(1, WORK), np.zeros(1, PROGRAM)
         self._commands, self._alphas = np.zeros((1, 2)), np.zeros((1, 2))
+        self._kernel: Callable[..., None] | None = None
         self._taken, self._everyone = np.zeros(1, dtype=np.int64), np.ones(1, dtype=bool)
         self._rewarded, self._ends = np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)
         self._calls = NOT_LOADED
@@ -279,6 +282,7 @@ class SharedControlEnv(HighwayEnv):
             else:
                 write_row(vehicle, traffic[0, j])
         self._batch = batch._replace(states=states, traffic=traffic, plans=plans)
+        self._crashed, self._k, self._position = batch.transitions["crashed"], batch.scenes["k"], states[0, :2]
         self._foreign = [
             (vehicle, row) for vehicle, row in zip(others, traffic[0], strict=True) if type(vehicle) is not LaneFollower
         ]
@@ -307,7 +311,8 @@ class SharedControlEnv(HighwayEnv):
     def _run_kernel(self) -> None:
         """Run one step of the kernel on the batch of size one."""
         self._taken[0] = 0
-        kernel.advance(
+        run = self._kernel or kernel.advance
+        run(
             self._taken,
             1,
             self._everyone,
@@ -323,6 +328,8 @@ class SharedControlEnv(HighwayEnv):
             self._programs,
             0,
         )
+        if self._kernel is None:
+            self._kernel = compiled_form(kernel.advance)
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Drive one time step.
@@ -353,23 +360,25 @@ class SharedControlEnv(HighwayEnv):
         recorder = self._record_video_wrapper
         every_frame = recorder is not None and recorder.recording and frames > 1
         # The caller may keep observation and info, so new arrays are used in each step.
-        self._outputs = self._outputs._replace(
-            observations=np.zeros((1, self._observation.size), np.float32), infos=np.zeros(1, INFO)
-        )
+        kept, new = self._outputs, np.empty((1, self._observation.size), np.float32)
+        self._outputs = Outputs(new, kept.rewards, kept.terminations, kept.truncations, np.empty(1, INFO), kept.drivers)
         self._batch.ended[0] = resetting
         if self._given_automation is None and not self._foreign and not every_frame and len(self._corners) <= MAX_HOLES:
-            self._batch.transitions["crashed"][0] |= not resetting and self.vehicle.crashed
+            ego = self.vehicle
+            if ego.crashed and not resetting:
+                self._crashed[0] = True
             self._run_kernel()
             if not resetting:
                 self.road.pass_frames(frames, self._setup.dt)
-                self.vehicle.crashed |= bool(self._batch.transitions["crashed"][0])
+                if self._crashed[0]:
+                    ego.crashed = True
         else:
             self._advance_with_python(resetting)
         if not resetting:
-            self.steps = int(self.scene["k"])
+            self.steps = int(self._k[0])
             self.time = self.steps / self.episode.policy_frequency
         # An episode may be continued past its end; the drawn path ends with the duration.
-        self._path[min(self.steps, len(self._path) - 1)] = self._batch.states[0, :2]
+        self._path[min(self.steps, len(self._path) - 1)] = self._position
         self.noted, self.observation = self._outputs.infos.reshape(()), self._outputs.observations[0]
 
     def _advance_with_python(self, resetting: bool) -> None:
@@ -572,7 +581,7 @@ class SharedControlEnv(HighwayEnv):
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling, without what belongs to this process: viewer, recorder and function addresses."""
-        return {**self.__dict__, "viewer": None, "_record_video_wrapper": None, "_calls": NOT_LOADED}
+        return {**self.__dict__, "viewer": None, "_record_video_wrapper": None, "_calls": NOT_LOADED, "_kernel": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Continue from the state of the pickled or copied environment.

@@ -118,8 +118,8 @@ class Clipping:
             )
 
 
-def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
-    """The value of a slot as a new array, clipped to its bounds.
+def checked_slot(slot: str, value: Any, clipping: Clipping) -> list[float]:
+    """The numbers of a slot, clipped to its bounds.
 
     Values beyond the bounds are clipped, as highway-env's ContinuousAction does.
 
@@ -138,7 +138,10 @@ def checked_slot(slot: str, value: Any, clipping: Clipping) -> np.ndarray:
         raise ValueError(
             f"action[{slot!r}] = {value!r} must be {size} finite number(s) in [{low:g}, {high:g}], shape ({size},)"
         )
-    beyond = min(values) < low - SLACK or max(values) > high + SLACK
+    smallest, largest = min(values), max(values)
+    beyond = smallest < low - SLACK or largest > high + SLACK
     if beyond or clipping.in_a_row[slot]:
         clipping.note(slot, array[None], beyond)
-    return array.clip(low, high)
+    if smallest < low or largest > high:
+        return [min(max(number, low), high) for number in values]
+    return values

@@ -128,6 +128,24 @@ def _ignore_literals(dispatcher: Any) -> None:
     dispatcher.get_call_template = get_call_template
 
 
+def compiled_form(function: Callable[..., Any]) -> Callable[..., Any] | None:
+    """The machine code of a function that has been called, as a Python function that does not look at its arguments.
+
+    Numba finds out the types of all arguments at every call, which takes longer than a step of the kernel. Where a
+    function is always called with the same types, that is not needed. Other types are undefined behaviour.
+
+    Args:
+        function: function compiled by :func:`jit`, with one form.
+
+    Returns:
+        The function; None before the first call. Where the core runs as Python, the function itself.
+    """
+    if is_interpreted():
+        return function
+    forms = list(cast(Any, function).overloads.values())
+    return forms[0].entry_point if len(forms) == 1 else None
+
+
 def is_cached(function: Callable[..., Any]) -> bool:
     """Whether numba's disk cache holds a compiled form of a function of this package.
 

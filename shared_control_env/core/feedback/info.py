@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -120,6 +119,8 @@ class Info:
 
 INFO = record_dtype(Info)
 
+_NAMES, _AUTOMATION = INFO.names or (), INFO["automation"].names or ()
+
 
 @jit
 def note_signals(scene: Scene, signals: Signals, faults: np.ndarray, failures: int, info: Info) -> None:
@@ -182,7 +183,8 @@ def as_dict(info: np.ndarray, terms: Sequence[str]) -> dict[str, Any]:
         info: record of :data:`INFO`, a 0-d array.
         terms: names of the reward's terms, in the order of the settings.
     """
-    values = _named(info.item(), info.dtype)
+    values = dict(zip(_NAMES, info.item(), strict=True))
+    values["automation"] = dict(zip(_AUTOMATION, values["automation"], strict=True))
     values["rewards"] = dict(zip(terms, values["rewards"].tolist(), strict=False))
     return values
 
@@ -212,19 +214,3 @@ def _by_term(rewards: np.ndarray, mask: np.ndarray, terms: Sequence[str]) -> dic
     for i, term in enumerate(terms):
         values[term], values[f"_{term}"] = rewards[:, i], mask
     return values
-
-
-def _named(values: tuple[Any, ...], dtype: np.dtype) -> dict[str, Any]:
-    """Values of a record by the names of their fields."""
-    names, nested = _fields(dtype)
-    named = dict(zip(names, values, strict=True))
-    for name, inner in nested:
-        named[name] = _named(named[name], inner)
-    return named
-
-
-@cache
-def _fields(dtype: np.dtype) -> tuple[tuple[str, ...], tuple[tuple[str, np.dtype], ...]]:
-    """Names of a record's fields, and names and types of those fields that are records themselves."""
-    names = dtype.names or ()
-    return names, tuple((name, dtype[name]) for name in names if dtype[name].names)

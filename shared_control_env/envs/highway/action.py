@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 from gymnasium import spaces
 from highway_env.envs.common.action import ActionType
 
@@ -36,20 +35,20 @@ class SlotAction(ActionType):
         """Class of the vehicle that executes the action."""
         return EgoVehicle
 
-    def decode(self, action: Any) -> tuple[np.ndarray, np.ndarray]:
+    def decode(self, action: Any) -> tuple[list[float], list[float]]:
         """Split an action into the driver's desired command and the automation's authority.
 
         Args:
             action: dict with the keys ``driver`` and ``authority``.
 
         Returns:
-            u_h,des, ``[a, delta]`` as shares of their limits in [-1, 1], shape (2,) [-]; and the authorities over both
-            channels, shape (1,) or (2,) [-].
+            u_h,des, ``[a, delta]`` as shares of their limits in [-1, 1] [-]; and one authority, or those over both
+            channels [-].
 
         Raises:
             ValueError: if a slot is missing, unknown, of the wrong shape or not finite.
         """
-        if not isinstance(action, dict | Mapping) or set(action) != set(SLOT_SPACES):
+        if not isinstance(action, dict | Mapping) or action.keys() != SLOT_SPACES.keys():
             raise ValueError(
                 f"action = {action!r} must be a dict with the keys {sorted(SLOT_SPACES)}; the wrappers "
                 "AuthorityLimiter and DriverModel bind one each"

@@ -54,16 +54,30 @@ TENSORBOARD = "tensorboard"
 """Folder of the TensorBoard log."""
 
 
+PARTS = ("environment", "adapters", "policy", "learning")
+"""What a training spends its time on; the adapters make what the policy sees of what the environment returns."""
+
+
 class Advance(BaseCallback):
-    """Callback that advances the progress bar at every step.
+    """Callback that advances the progress bar at every step, and measures the time between updates of the policy.
 
     Args:
         advance: called with the number of steps.
+
+    Attributes:
+        seconds: time spent in rollouts so far [s].
     """
 
     def __init__(self, advance: Callable[[int], None]) -> None:
         super().__init__()
         self._advance = advance
+        self.seconds = 0.0
+
+    def _on_rollout_start(self) -> None:
+        self._begin = time.perf_counter()
+
+    def _on_rollout_end(self) -> None:
+        self.seconds += time.perf_counter() - self._begin
 
     def _on_step(self) -> bool:
         self._advance(self.training_env.num_envs)
@@ -121,7 +135,7 @@ class Training:
         self.environments, self.segment = self.parameters.pop("environments"), self.parameters.pop("segment")
         self.half_life = self.parameters.pop("half_life")
         self.state: dict[str, Any] = {"card": self.card, "steps": 0, "scores": []}
-        self.state |= {"seconds": 0.0, "in_environment": 0.0}
+        self.state |= {"seconds": 0.0, "seconds_in": dict.fromkeys(PARTS, 0.0)}
         if (folder / PROGRESS).is_file():
             self.state = json.loads((folder / PROGRESS).read_text())
             for name, wanted in json.loads(json.dumps(self.card)).items():
@@ -147,23 +161,27 @@ class Training:
         segment_seed = int(word) % (VALIDATION_SEED - self.environments)
         self._begin()
         bare = make_environment(self.ids, self.task, self.environments, segment_seed)
-        timed: Any = unwrap_vec_wrapper(bare, Timed)
-        env = self._normalised(bare)
-        model = self._model(env)
+        inner: Any = unwrap_vec_wrapper(bare, Timed)
+        normalised = self._normalised(bare)
+        env = Timed(normalised)
+        model, progress = self._model(env), Advance(advance)
         torch.set_num_threads(1)  # the networks are small: more threads only wait for each other
         set_random_seed(segment_seed)
         env.seed(segment_seed)  # the model has seeded them with its own seed
         begin = time.perf_counter()
         model.learn(
             self.segment,
-            callback=Advance(advance),
+            callback=progress,
             tb_log_name="training",
             reset_num_timesteps=self.state["steps"] == 0,
         )
-        self.state["seconds"] += time.perf_counter() - begin
-        self.state["in_environment"] += timed.seconds
+        seconds = time.perf_counter() - begin
+        self.state["seconds"] += seconds
+        ends = 0.0, inner.seconds, env.seconds, progress.seconds, seconds
+        for part, lower, upper in zip(PARTS, ends, ends[1:], strict=False):
+            self.state["seconds_in"][part] += upper - lower
         env.close()
-        self._keep(model, env)
+        self._keep(model, normalised)
 
     def _begin(self) -> None:
         """Mark the folder as a training before the first segment is complete, and drop the log of an incomplete one."""
@@ -245,10 +263,11 @@ def main(
             run(training, steps, console)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    share = training.state["in_environment"] / training.state["seconds"]
+    seconds, parts = training.state["seconds"], training.state["seconds_in"].items()
+    spent = ", ".join(f"{part} {100.0 * own / seconds:.0f} %" for part, own in parts)
     console.print(
-        f"{training.state['steps']:,} steps in {training.state['seconds']:.0f} s, {100.0 * share:.0f} % of it in the "
-        f"environment; the best policy is {folder / BEST}, the log {folder / TENSORBOARD}."
+        f"{training.state['steps']:,} steps in {seconds:.0f} s ({spent}); the best policy is {folder / BEST}, the log "
+        f"{folder / TENSORBOARD}."
     )
 
 

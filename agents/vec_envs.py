@@ -199,7 +199,7 @@ class WithHistory(VecEnvWrapper):
 
 
 class Timed(VecEnvWrapper):
-    """Measures the time that the environment takes.
+    """Measures the time that an environment takes.
 
     Args:
         env: the vectorised environment.

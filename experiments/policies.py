@@ -207,7 +207,7 @@ def part_of_card(task: str, table: pd.DataFrame) -> dict[str, Any]:
         "steps": f"{states[0]['steps']:,}",
         "fastest": round(min(seconds)),
         "slowest": round(max(seconds)),
-        "share": round(100.0 * sum(state["in_environment"] for state in states) / sum(seconds)),
+        "share": round(100.0 * sum(state["seconds_in"]["environment"] for state in states) / sum(seconds)),
         "episodes": f"{len(table):,}",
         "table": "\n".join(as_markdown(rows)),
         "verdict": "\n".join(verdict(rows, task)),

@@ -1,6 +1,7 @@
 """Training repeats, goes on where it was stopped, and gives policies that act the same wherever they are loaded."""
 
 import json
+import re
 
 import gymnasium as gym
 import numpy as np
@@ -240,7 +241,9 @@ def test_the_command_trains_and_names_what_it_does_not_know(tmp_path):
     app.command()(train.main)
     result = runner.invoke(app, arguments)
     assert result.exit_code == 0, result.output
-    assert "in the environment" in " ".join(result.output.split())
+    shares = re.findall(r"(environment|adapters|policy|learning) (\d+) %", " ".join(result.output.split()))
+    assert len(shares) == 4
+    assert sum(int(share) for _, share in shares) == pytest.approx(100, abs=2)
     wrong = runner.invoke(app, ["--env", "SharedControl/LaneKepping-v1"])
     assert "LaneKeeping-v1" in wrong.output
     assert wrong.exit_code == 2

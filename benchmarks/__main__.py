@@ -11,8 +11,9 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import allocators, controllers, environments, parts, startup, suite, vectors
+from benchmarks import allocators, controllers, environments, scenarios, startup, suite, vectors
 from benchmarks.timing import Timing
+from shared_control_env.registration import ENVIRONMENTS
 
 
 def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timing.")] = 15) -> None:
@@ -44,6 +45,7 @@ def main(repeats: Annotated[int, typer.Option(min=3, help="Repeats of every timi
     report("import and first step, warm caches", f"{whole.median:.2f} s", "", "")
 
     _vectors(report, peer, limited, repeats)
+    _scenarios(report, max(3, repeats // 3))
     _allocators(report, max(3, repeats // 3))
     seconds = Timing.of(suite.seconds_for(10_000, max(3, repeats // 5)))
     spread = f"{seconds.median:.0f} s ({seconds.low:.0f} to {seconds.high:.0f})"
@@ -91,20 +93,37 @@ def _vectors(report: Callable[..., None], peer: Timing, single: Timing, repeats:
                 report(
                     f"kernel, N = {n}, {who}, all cores", str(every), rate, "1.9 x on two cores" if n == 1024 else ""
                 )
-    for id in ("SharedControl/LeadBraking-v1", "SharedControl/DenseTraffic-v1"):
-        one = vectors.kernel(256, False, max(3, repeats // 5), id).one
-        what = f"kernel, N = 256, {id.removeprefix('SharedControl/')}, 1 core, draws of episodes included"
-        report(what, str(one), f"{1.0 / one.median:,.0f}/s", "")
     for what, (config, base, target) in vectors.VARIANTS.items():
         timing, speed = vectors.variant(config, base, repeats)
         report(f"kernel, N = 256, driver, 1 core: {what}", str(timing), f"{speed:.2f} x", target)
     report("memory of an environment", f"{vectors.bytes_per_environment():,} B", "", "4,096 B")
-    for name, timing in parts.times(repeats).items():
-        report(f"part: {name}", str(timing), "", "")
+
+
+def _scenarios(report: Callable[..., None], repeats: int) -> None:
+    """Rows of every scenario with every driver, and of what its time goes into."""
+    rows = scenarios.speeds(repeats)
+    for row in rows:
+        target = f"{scenarios.TARGET} x" if row.driver == "nobody" else ""
+        name = row.id.removeprefix("SharedControl/")
+        report(
+            f"kernel, N = {scenarios.N}, 1 core: {name}, {row.driver}",
+            str(row.timing),
+            f"{row.speed:.2f} x TwoLane, nobody; {1.0 / row.timing.median:,.0f}/s",
+            target,
+        )
+    for driver in scenarios.DRIVERS:
+        report(f"geometric mean over scenarios, {driver}", "", f"{scenarios.mean_speed(rows, driver):.2f} x", "")
+    for id in ENVIRONMENTS:
+        both = vectors.kernel(4096, False, max(3, repeats // 5), id).ratio
+        name = id.removeprefix("SharedControl/")
+        report(f"kernel, N = 4096, all cores: {name}, nobody", "", f"{both:.2f} x one core", "1.9 x on two cores")
+        for part, timing in scenarios.shares(id, max(3, repeats // 3)).items():
+            report(f"part of {name}: {part}", str(timing), "", "")
 
 
 def _times(slow: Timing, fast: Timing) -> str:
     return f"{slow.median / fast.median:.1f} x"
 
 
-typer.run(main)
+if __name__ == "__main__":
+    typer.run(main)

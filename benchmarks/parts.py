@@ -131,18 +131,19 @@ def _anew(batch: Batch, automations: np.ndarray, states: np.ndarray, run: Callab
     return N
 
 
-def times(repeats: int) -> dict[str, Timing]:
+def times(repeats: int, id: str = "SharedControl/TwoLane-v1") -> dict[str, Timing]:
     """Time of each part for one environment.
 
     Args:
         repeats: number of repeats.
+        id: id of the environment.
 
     Returns:
         Time by the name of the part in :data:`PARTS`.
     """
     found = {}
     for name, loop in PARTS.items():
-        env = gym.make_vec("SharedControl/TwoLane-v1", num_envs=N, threads=1)
+        env = gym.make_vec(id, num_envs=N, threads=1)
         env.reset(seed=0)
         rng = np.random.default_rng(0)
         for _ in range(25):

@@ -64,7 +64,7 @@ def variant(config: dict[str, Any], base: dict[str, Any], repeats: int) -> tuple
     Returns:
         Time of an environment's step, and the speed relative to the base, median of the pairs [-].
     """
-    ours, others = (_block("SharedControl/TwoLane-v1", 256, 1, True, each) for each in (config, base))
+    ours, others = (block("SharedControl/TwoLane-v1", 256, 1, True, each) for each in (config, base))
     pairs = [(ours(), others()) for _ in range(repeats)]
     return Timing.of([own for own, _ in pairs]), float(np.median([other / own for own, other in pairs]))
 
@@ -82,8 +82,8 @@ def kernel(num_envs: int, driver: bool, repeats: int, id: str = "SharedControl/T
         id: id of the environment.
     """
     ours = cores()
-    alone = _block(id, num_envs, 1, driver)
-    everywhere = _block(id, num_envs, len(ours), driver) if min(len(ours), num_envs) > 1 else None
+    alone = block(id, num_envs, 1, driver)
+    everywhere = block(id, num_envs, len(ours), driver) if min(len(ours), num_envs) > 1 else None
     one, every, ratios = [], [], []
     for _ in range(repeats):
         for core in ours:
@@ -100,32 +100,56 @@ def _rate(seconds: list[float]) -> float:
     return float(np.mean(1.0 / np.array(seconds)))
 
 
-def _block(id: str, num_envs: int, threads: int, driver: bool, config: Mapping[str, Any] = {}) -> Callable[[], float]:
-    """A timed block of steps of new environments; a first block runs at once, unmeasured."""
-    config = {**config, "solver": {"iterations": ITERATIONS}}
-    env = gym.make_vec(id, num_envs=num_envs, threads=threads, driver=driver, config=config)
+def block(
+    id: str,
+    num_envs: int,
+    threads: int,
+    driver: bool,
+    config: Mapping[str, Any] = {},
+    iterations: int | None = ITERATIONS,
+    commands: float = 0.1,
+    steps: int | None = None,
+) -> Callable[[], float]:
+    """A timed block of steps of new environments; a first block runs at once, unmeasured.
+
+    Args:
+        id: id of the environment.
+        num_envs: number of environments.
+        threads: number of threads.
+        driver: whether the predictive driver is bound.
+        config: settings.
+        iterations: number of the automation's iterations; None for the default.
+        commands: standard deviation of the driver's commands, as shares of the limits, held over the block [-].
+        steps: number of steps of a block; None for :data:`BLOCK` steps of environments.
+
+    Returns:
+        Function that returns the time of an environment's step [s].
+    """
+    if iterations is not None:
+        config = {**config, "solver": {"iterations": iterations}}
+    env = gym.make_vec(id, num_envs=num_envs, threads=threads, driver=driver, config=dict(config))
     env.reset(seed=0)
-    actions = 0.1 * np.random.default_rng(0).normal(size=(num_envs, 2)).clip(-1, 1)
-    steps = max(2, BLOCK // num_envs)
+    actions = commands * np.random.default_rng(0).normal(size=(num_envs, 2)).clip(-1, 1)
+    count = max(2, BLOCK // num_envs) if steps is None else steps
 
-    def block() -> float:
+    def run() -> float:
         begin = perf_counter()
-        for _ in range(steps):
+        for _ in range(count):
             env.step(actions)
-        return (perf_counter() - begin) / (steps * num_envs)
+        return (perf_counter() - begin) / (count * num_envs)
 
-    block()
-    return block
+    run()
+    return run
 
 
-def _on_core(core: int, block: Callable[[], float]) -> float:
+def _on_core(core: int, run: Callable[[], float]) -> float:
     """Time a block on one core, if the operating system supports the choice of a core."""
     if not hasattr(os, "sched_setaffinity"):
-        return block()
+        return run()
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {core})
     try:
-        return block()
+        return run()
     finally:
         os.sched_setaffinity(0, allowed)
 
@@ -148,12 +172,12 @@ def highway_processes(repeats: int) -> Timing:
     envs.reset(seed=0)
     envs.action_space.seed(0)
 
-    def block() -> int:
+    def run() -> int:
         for _ in range(50):
             envs.step(0.1 * envs.action_space.sample())
         return 50 * n
 
-    timing = time_block(block, repeats)
+    timing = time_block(run, repeats)
     envs.close()
     return timing
 
@@ -171,14 +195,14 @@ def metadrive(repeats: int) -> Timing | None:
     env = MetaDriveEnv({"use_render": False, "traffic_density": 0.05, "log_level": 50})
     env.reset()
 
-    def block() -> int:
+    def run() -> int:
         for _ in range(100):
             _, _, terminated, truncated, _ = env.step([0.0, 0.2])
             if terminated or truncated:
                 env.reset()
         return 100
 
-    timing = time_block(block, repeats)
+    timing = time_block(run, repeats)
     env.close()
     return timing
 

@@ -1,10 +1,15 @@
 """The benchmark's parts run and count what they say; their times are not tested."""
 
+from functools import partial
+from pathlib import Path
+
 import numpy as np
 
-from benchmarks import controllers, environments, parts, suite, vectors
+from benchmarks import controllers, cost, environments, parts, scenarios, suite, vectors
 from benchmarks.timing import Timing, time_block
 from shared_control_env.core.compile.cold_start import cores
+
+ROOT = Path(__file__).parents[2]
 
 
 def test_timing():
@@ -42,3 +47,30 @@ def test_parts_and_vectors_run():
     (seconds,) = suite.seconds_for(10, 1, "paper")
     assert seconds > 0.0
     assert 0 < vectors.bytes_per_environment() <= 4400
+
+
+def test_every_scenario_is_timed_with_every_driver(monkeypatch):
+    ids = {"SharedControl/TwoLane-v1": "two_lane", "SharedControl/Bend-v1": "bend"}
+    monkeypatch.setattr(scenarios, "ENVIRONMENTS", ids)
+    monkeypatch.setattr(scenarios, "N", 32)
+    monkeypatch.setattr(scenarios, "STEPS", 5)
+    rows = scenarios.speeds(1)
+    assert {(row.id, row.driver) for row in rows} == {(id, driver) for id in ids for driver in scenarios.DRIVERS}
+    assert next(row.speed for row in rows if (row.id, row.driver) == scenarios.REFERENCE) == 1.0
+    assert scenarios.mean_speed(rows, "mpc") > 0.0
+    found = scenarios.shares("SharedControl/Bend-v1", 1)
+    assert found["drawing of episodes"].median > 0.0
+    assert set(parts.PARTS) < set(found)
+
+
+def test_the_page_on_the_cost_of_a_step(monkeypatch, tmp_path):
+    work = {name: (values[:2], of) for name, (values, of) in cost.WORK.items()}
+    monkeypatch.setattr(cost, "WORK", work)
+    monkeypatch.setattr(cost, "VEHICLES", work["other vehicles"][0])
+    monkeypatch.setattr(cost, "N", 4)
+    monkeypatch.setattr(cost, "block", partial(vectors.block, steps=5))
+    cost.main(repeats=3, out=tmp_path)
+    page = (tmp_path / "speed.md").read_text()
+    assert (tmp_path / "speed.png").stat().st_size > 10_000
+    assert page.count("| --- | --- |") == 3
+    assert "| 30 |" in (ROOT / "docs/speed.md").read_text()

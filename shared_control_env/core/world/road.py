@@ -22,6 +22,9 @@ S0, X0, Y0, PSI0, KAPPA, LENGTH, WIDTH, WIDTH_SLOPE, RIGHT, RIGHT_SLOPE, LEFT, L
 COLUMNS = 12
 """Length of a segment's row."""
 
+_ROUNDING = 1e-6
+"""Margin of a comparison of distances [m]."""
+
 MAX_ARC = pi / 2
 """Largest angle of one arc segment [rad]: the angles of highway-env's CircularLane wrap after half a turn."""
 
@@ -185,16 +188,24 @@ def locate(line: np.ndarray, x: float, y: float) -> tuple[float, float, float, f
     Returns:
         ``s, d`` [m], and the heading [rad] and curvature [1/m] of the line at s.
     """
-    n = line.shape[0]
-    best = np.inf
-    s = d = 0.0
-    nearest = 0
+    n = 0
+    closest, start = 0, np.inf
+    while n < line.shape[0] and line[n, S0] != np.inf:
+        away = (x - line[n, X0]) ** 2 + (y - line[n, Y0]) ** 2
+        if away < start:
+            closest, start = n, away
+        n += 1
+    along, across = _project(line[closest], x, y)
+    best = abs(across) + max(0.0, -along, along - line[closest, LENGTH])
+    nearest, s, d = closest, line[closest, S0] + along, across
     for i in range(n):
-        if line[i, S0] == np.inf:
-            break
+        # No point of a segment is further from its start than its length, so that most need no projection.
+        reach = best + line[i, LENGTH] + _ROUNDING
+        if i == closest or (x - line[i, X0]) ** 2 + (y - line[i, Y0]) ** 2 > reach * reach:
+            continue
         along, across = _project(line[i], x, y)
         distance = abs(across) + max(0.0, -along, along - line[i, LENGTH])
-        if distance < best:
+        if distance < best or (distance == best and i < nearest):  # of several, the first
             best, nearest = distance, i
             s, d = line[i, S0] + along, across
     row = line[nearest]

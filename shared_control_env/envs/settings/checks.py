@@ -6,6 +6,7 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, get_args
 
@@ -197,6 +198,12 @@ def _check_recording(settings: Settings) -> None:
         )
 
 
+@cache
+def _defaults() -> dict[str, Any]:
+    """All settings at their defaults; not to be changed."""
+    return plain(Settings())
+
+
 def _check_drawn_recording(settings: Settings) -> None:
     """Check that the settings of one episode are those that its recording decides."""
     recording = settings.recording
@@ -205,7 +212,7 @@ def _check_drawn_recording(settings: Settings) -> None:
         raise ValueError("config['recording']['drawn'] = True is set by the environment, with one file and its ego")
     dt = 1.0 / settings.simulation_frequency
     decided = decided_by(replay_of(Path(recording.file), recording.ego, dt, settings.simulation_steps))
-    config, default = plain(settings), plain(Settings())
+    config, default = plain(settings), _defaults()
     wanted = {name: default[name] for name in DECIDED}
     wanted |= {name: {**config[name], **values} for name, values in decided.items()}
     for name, value in wanted.items():

@@ -535,14 +535,14 @@ class SharedControlEnv(HighwayEnv):
 
         Args:
             state: state of the ego, shape (6,) [m, rad, m/s, rad/s].
-            traffic: other vehicles, one per row, shape (n, 8).
+            traffic: other vehicles, one per row, and perhaps rows that are left over, shape (n, 8).
             scene: record of :data:`records.SCENE`.
             signals: record of :data:`records.SIGNALS`.
             noted: record of :data:`info.INFO`.
             path: positions of the ego so far, shape (k + 1, 2) [m].
         """
         self.vehicle.array[:] = state
-        for vehicle, row in zip(self.road.vehicles[1:], traffic, strict=True):
+        for vehicle, row in zip(self.road.vehicles[1:], traffic, strict=False):  # rows that are left over are away
             vehicle.array[:] = row
         for vehicle in self.road.vehicles:  # the viewer marks those that overlap now
             vehicle.crashed = False

@@ -467,3 +467,15 @@ def test_a_recording_without_lanes_or_vehicles_is_none():
     track = Track(4.5, 1.8, np.arange(3.0), np.arange(3.0), np.zeros(3), np.zeros(3))
     with pytest.raises(ValueError, match="has no lane"):
         check(Recording("x", {}, {"1": track}))
+
+
+def test_pictures_of_the_kernels_environments_show_the_recording():
+    """An episode may have fewer vehicles than the batch has rows, since the ego is one of the recording's."""
+    envs = gym.make_vec(ID, num_envs=2, render_mode="rgb_array", config={"duration": 2.0})
+    envs.reset(seed=3)
+    single = gym.make(ID, render_mode="rgb_array", config={"duration": 2.0})
+    single.reset(seed=3)
+    for _ in range(5):
+        envs.step(np.zeros((2, 2)))
+        single.step(np.zeros(2))
+    np.testing.assert_array_equal(envs.render()[0], single.render())

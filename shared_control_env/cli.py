@@ -28,7 +28,12 @@ from shared_control_env.evaluation.metrics import METRICS
 from shared_control_env.evaluation.storage import MARGINS, REPORT, TABLE
 from shared_control_env.nearest import hint
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, help=__doc__, pretty_exceptions_enable=False)
+HELP = """Shared control under automation degradation: benchmark, controllability, and people at the wheel.
+
+A run that is stopped goes on with the same command, and no folder of other results is overwritten. "list" names what
+the options take; "extras" says what is installed here.
+"""
+app = typer.Typer(no_args_is_help=True, help=HELP, pretty_exceptions_enable=False)
 COLUMNS = {
     "terminated": "failures",
     "collisions": "collisions",
@@ -51,6 +56,19 @@ def _main(
     version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print it.")] = False,
 ) -> None:
     """Read what goes before a command."""
+
+
+@app.command("extras")
+def extras() -> None:
+    """Say which extras of the package are installed here, and what the others would add."""
+    from shared_control_env.extras import EXTRAS, missing_for
+
+    table = Table("extra", "for", "installed")
+    for name, what in EXTRAS.items():
+        missing = missing_for(name)
+        install = escape(f'no: pip install "shared_control_env[{name}]" (lacks {", ".join(missing)})')
+        table.add_row(name, what, install if missing else "yes")
+    Console().print(table)
 
 
 def _names(text: str) -> list[str] | str:

@@ -6,7 +6,7 @@ RLLIB = $(VENV)-rllib
 OFFLINE = $(VENV)-offline
 PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet install -c constraints.txt
 
-.PHONY: help install reproduce reference benchmark sensitivity studies policies test rllib offline lint types golden hooks pythons bench speed figures clean
+.PHONY: help install docs reproduce reference benchmark sensitivity studies policies test rllib offline lint types golden hooks pythons bench speed figures clean
 
 help:
 	@echo "make reproduce  run the paper's cases and write figures, videos and claims to results/paper"
@@ -23,6 +23,7 @@ help:
 	@echo "make policies   train the policies that ship, compare them, and write them and their card to the package"
 	@echo "make bench      speed, as ratios against highway-env and SciPy in the same run"
 	@echo "make speed      measure what a step costs against the work, and write docs/speed.md"
+	@echo "make docs       the documentation as web pages, in docs/_build/html; its code is run and its videos are made"
 	@echo "make figures    copy the README's pictures from results/paper"
 	@echo "make clean      remove the virtual environment"
 
@@ -100,6 +101,9 @@ $(OFFLINE)/.offline: pyproject.toml Makefile
 
 offline: $(OFFLINE)/.offline
 	$(OFFLINE)/bin/python -m pytest -q --noconftest -W ignore tests/agents/test_offline.py $(ARGS)
+
+docs: $(VENV)/.dev
+	$(BIN)/python -m sphinx -W --keep-going -j auto -q -d docs/_build/doctrees docs docs/_build/html $(ARGS)
 
 speed: $(VENV)/.dev
 	$(BIN)/python -m benchmarks.cost $(ARGS)

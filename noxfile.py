@@ -23,3 +23,14 @@ def tests(session: nox.Session) -> None:
     """
     session.install("-c", "constraints.txt", "-e", ".[dev]")
     session.run("python", "-m", "pytest", "-q", "-n", "auto", *(session.posargs or ["--ignore=tests/agents"]))
+
+
+@nox.session(python="3.11")
+def docs(session: nox.Session) -> None:
+    """The documentation, with its code run and warnings as errors.
+
+    Args:
+        session: virtual environment.
+    """
+    session.install("-c", "constraints.txt", "-e", ".[docs,train]")
+    session.run("python", "-m", "sphinx", "-W", "--keep-going", "-j", "auto", "-q", "docs", "docs/_build/html")

@@ -1,9 +1,12 @@
 """Every block of the pages in docs runs, from outside the package, and does what the page says."""
 
+import ast
 import re
 import subprocess
 import sys
 from pathlib import Path
+
+from shared_control_env.cli import app
 
 ROOT = Path(__file__).parent.parent
 EXTENDING = ROOT / "docs/extending.md"
@@ -155,7 +158,7 @@ def test_the_page_on_people_at_the_wheel(tmp_path):
     """Its Python runs; its plan is one; its study and identification run with simulated people."""
     from shared_control_env.drive.study.plan import read_plan
 
-    text = (ROOT / "docs/at_the_wheel.md").read_text()
+    text = "\n".join((ROOT / f"docs/{name}.md").read_text() for name in ("at_the_wheel", "study", "identification"))
     code = "\n".join(re.findall(r"```python\n(.*?)```", text, re.S))
     assert subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True).returncode == 0
     (plan,) = re.findall(r"```toml\n(.*?)```", text, re.S)
@@ -172,3 +175,37 @@ def test_the_page_on_people_at_the_wheel(tmp_path):
     for command_line in re.findall(r"^    shared-control (.*)$", text, re.M):
         name = command_line.split()[0]
         assert subprocess.run([*command, name, "--help"], capture_output=True).returncode == 0
+
+
+def test_the_table_of_equations_is_that_of_the_sources():
+    """Each function is there, names its equation, and is tested in the file that the table names."""
+    rows = re.findall(
+        r"^\| (\d+) \| .* \| `(.+)`: `(\w+)` \| `(.+)` \|$", (ROOT / "docs/equations.md").read_text(), re.M
+    )
+    assert len(rows) >= 13
+    for number, file, name, test in rows:
+        source = (ROOT / "shared_control_env/core" / file).read_text()
+        (found,) = [node for node in ast.walk(ast.parse(source)) if getattr(node, "name", None) == name]
+        told = (ast.get_docstring(found) or "") + (ast.get_docstring(ast.parse(source)) or "")
+        assert re.search(rf"Eq\. (\d+(, |-))*{number}\b", told), (number, file, name)
+        module = file.removesuffix(".py").replace("/", ".")
+        assert module.split(".")[-1] in (ROOT / test).read_text() or name in (ROOT / test).read_text(), test
+
+
+def test_links_between_pages_lead_somewhere():
+    for page in (ROOT / "docs").glob("*.md"):
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text()):
+            assert (page.parent / target).is_file(), f"{page.name}: {target}"
+
+
+def test_commands_on_the_pages_exist():
+    """Modules that are run, targets of make, and commands of shared-control."""
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.M))
+    commands = {command.name or command.callback.__name__ for command in app.registered_commands}
+    commands |= {group.name for group in app.registered_groups}
+    for page in (ROOT / "docs").glob("*.md"):
+        text = page.read_text()
+        assert set(re.findall(r"`make ([a-z]+)`", text)) <= targets, page.name
+        assert set(re.findall(r"^    shared-control ([a-z]+)", text, re.M)) <= commands, page.name
+        for module in re.findall(r"^    (?:\S*bin/)?python -m ((?:agents|experiments|benchmarks)\.\w+)", text, re.M):
+            assert (ROOT / module.replace(".", "/")).with_suffix(".py").is_file(), (page.name, module)

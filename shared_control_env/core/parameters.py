@@ -209,8 +209,8 @@ class LawParameters(NamedTuple):
     """Tolerances of the first line of Eq. 10, in physical units; both ours.
 
     Attributes:
-        tolerance_a: largest |a_f - a_des| that counts as equal [m/s^2].
-        tolerance_delta: largest |delta_f - delta_des| that counts as equal [rad].
+        tolerance_a: largest ``|a_f - a_des|`` that counts as equal [m/s^2].
+        tolerance_delta: largest ``|delta_f - delta_des|`` that counts as equal [rad].
     """
 
     tolerance_a: NonNegative = 0.01

@@ -1,10 +1,8 @@
 """Minari datasets of recorded drives and of demonstrations, for learning from them.
 
 ``infos`` of every episode hold what a learned driver sees beside the observation, and what it is to imitate:
-
-    felt      u_a,act of the step before [m/s^2, rad], shape (T + 1, 2)
-    wanted    command that the driver wanted, as a share of the limits [-], shape (T, 2); the action is the one that was
-              executed, which noise may have disturbed
+``felt`` is u_a,act of the step before [m/s^2, rad], shape (T + 1, 2); ``wanted`` is the command that the driver wanted,
+as a share of the limits [-], shape (T, 2). The action is the one that was executed, which noise may have disturbed.
 """
 
 from __future__ import annotations

@@ -32,8 +32,10 @@ def is_setter(node):
 
 
 def undocumented(node, names):
-    """Arguments that the docstring does not describe."""
+    """Arguments that neither the docstring nor the help of an option describes."""
     text = ast.get_docstring(node) or ""
+    helped = {arg.arg for arg in node.args.args if arg.annotation and "help=" in ast.unparse(arg.annotation)}
+    names = [name for name in names if name not in helped]
     if "Args:" not in text:
         return names
     section = text.split("Args:", 1)[1]

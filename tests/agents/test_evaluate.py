@@ -1,5 +1,7 @@
 """The table of trained drivers and allocators beside the others."""
 
+from functools import partial
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -122,7 +124,9 @@ def test_command(idle):
     assert wrong.exit_code == 2
 
 
-def test_video_side_by_side(idle, tmp_path):
+def test_video_side_by_side(idle, tmp_path, monkeypatch):
+    short = {"duration": 2.0, "screen_width": 400, "screen_height": 250}
+    monkeypatch.setattr(render, "replay_episode", partial(render.replay_episode, config=short))
     (policy,) = idle("driver", (0.0,))
     app = render.typer.Typer()
     app.command()(render.main)

@@ -32,7 +32,8 @@ def test_every_part_runs():
     assert np.isfinite(gaps).all()
 
 
-def test_parts_and_vectors_run():
+def test_parts_and_vectors_run(monkeypatch):
+    monkeypatch.setattr(vectors, "BLOCK", 512)
     assert all(timing.median > 0.0 for timing in parts.times(1).values())
     one = vectors.kernel(1, True, 1)
     assert one.one.median > 0.0

@@ -9,13 +9,7 @@ OUT = Path("results/examples/controllability")
 BUDGET = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
 
 if __name__ == "__main__":  # with jobs=2, processes import this file
-    margins = controllability(
-        "bias",
-        ["none", "proportional", "barrier"],
-        "hands_on",
-        scenarios=["lane_keeping", "bend"],
-        budget=BUDGET,
-        out=OUT,
-    )
+    authorities, scenarios = ["none", "proportional", "barrier"], ["lane_keeping", "bend"]
+    margins = controllability("bias", authorities, "hands_on", scenarios=scenarios, budget=BUDGET, out=OUT)
     print(margins[["authority", "s_90", "s_90_low", "s_90_high", "unit"]].round(3).to_string(index=False))
     print(f"The report is {OUT / 'report.html'}. An interrupted run goes on from there.")

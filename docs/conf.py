@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 import gallery
 
 import shared_control_env
+from shared_control_env.evaluation.episodes import versions
 
 HERE = Path(__file__).parent
 
@@ -41,10 +43,13 @@ html_extra_path: list[str] = []
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "substitution"]
 myst_heading_anchors = 3
 nb_execution_mode = "cache"
-nb_execution_cache_path = str(HERE / "_build" / "notebooks")
+# What a page shows is that of these sources: another state of them has another cache.
+SOURCES = sha256((versions() + (HERE / "gallery.py").read_text()).encode()).hexdigest()[:16]
+nb_execution_cache_path = str(HERE / "_build" / "notebooks" / SOURCES)
 nb_execution_raise_on_error = True
 nb_execution_timeout = 180
 nb_merge_streams = True
+nb_output_stderr = "remove"  # the notice of a first compilation
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"

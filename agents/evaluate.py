@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -86,6 +87,7 @@ def measure(
     seeds: int,
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
+    trusted: bool = False,
 ) -> pd.DataFrame:
     """Run episodes of all drivers under the fuzzy limiter, or of all authorities beside a population of persons.
 
@@ -96,11 +98,12 @@ def measure(
         seeds: number of seeds per scenario and degradation; the first is :data:`agents.tasks.HELD_OUT_SEED`.
         jobs: number of processes.
         progress: called with the number of finished episodes and the number of all episodes.
+        trusted: whether models of Stable-Baselines3 may be read.
 
     Returns:
         The benchmark's table; ``name`` is the driver or authority, and ``kind`` says whether training used the fault.
     """
-    make: Callable[[str], Any] = driver_entry if task == "driver" else authority_entry
+    make: Callable[[str], Any] = partial(driver_entry, trusted=trusted) if task == "driver" else authority_entry
     learned = {f"{LEARNED} {i}": make(source) for i, source in enumerate(sources)}
     entries = {**learned, **{name: make(name) for name in COMPARED[task]}}
     drivers, authorities = (entries, "proportional") if task == "driver" else (BESIDE, entries)
@@ -113,18 +116,24 @@ def measure(
 
 
 def measure_and_show(
-    console: Console, task: str, sources: Sequence[str], scenarios: Sequence[str], seeds: int, jobs: int
+    console: Console,
+    task: str,
+    sources: Sequence[str],
+    scenarios: Sequence[str],
+    seeds: int,
+    jobs: int,
+    trusted: bool = False,
 ) -> pd.DataFrame:
     """Run :func:`measure` with a progress bar.
 
     Args:
         console: where the progress is shown.
-        task, sources, scenarios, seeds, jobs: as in :func:`measure`.
+        task, sources, scenarios, seeds, jobs, trusted: as in :func:`measure`.
     """
     with progress_bar(console) as bar:
         running = bar.add_task(f"episodes, {task}", total=None)
         update = lambda done, total: bar.update(running, completed=done, total=total)
-        return measure(task, sources, scenarios, seeds, jobs, update)
+        return measure(task, sources, scenarios, seeds, jobs, update, trusted)
 
 
 def compare(table: pd.DataFrame, task: str) -> list[Row]:
@@ -219,6 +228,8 @@ def where_it_loses(table: pd.DataFrame, task: str) -> list[str]:
         table: result of :func:`measure`.
         task: key of :data:`agents.tasks.TASKS`.
     """
+    if table["name"][table["name"].str.startswith(LEARNED)].nunique() < 2:
+        return ["- not known: a single training seed gives no interval; name the policies of several."]
     lost, baseline = losses(table, task), BASELINE[task]
     lines = []
     for metric, part in lost.groupby("metric", sort=False):
@@ -256,7 +267,10 @@ def show(rows: Sequence[Row], console: Console) -> None:
             table.add_row(row.name, *(f"{value.estimate:.3g}" for value in row.values.values()))
         console.print(table)
         difference = of_kind[-1]
-        console.print(f"{difference.name}, 95 % interval:")
+        known = any(np.isfinite(value.low) for value in difference.values.values())
+        console.print(
+            f"{difference.name}, {'95 % interval' if known else 'without intervals, from one training seed'}:"
+        )
         for metric, value in difference.values.items():
             console.print(f"  {metric.replace('_', ' ')}: {shown(value)}", markup=False)
 
@@ -280,6 +294,7 @@ def main(
     scenarios: Annotated[str, typer.Option(help="Names, separated by commas; by default those of training.")] = "",
     seeds: Annotated[int, typer.Option(min=1, help="Held-out seeds of each degradation.")] = 3,
     jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+    trusted: Annotated[bool, typer.Option(help="Read models (.zip), whose code runs as they are read.")] = False,
 ) -> None:
     """Print how trained drivers (or allocators) compare, and where they lose."""
     console = Console()
@@ -290,7 +305,7 @@ def main(
             raise ValueError(f"the package ships no policy of the task {task!r}; give files")
         names = [name.strip() for name in scenarios.split(",")] if scenarios else scenarios_of(chosen, task)
         choose("scenario", names, SCENARIOS)
-        table = measure_and_show(console, task, chosen, names, seeds, jobs)
+        table = measure_and_show(console, task, chosen, names, seeds, jobs, trusted)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
     console.print(f"{len(table)} episodes of {', '.join(names)}")

@@ -174,15 +174,17 @@ def _cell(timing: Timing) -> str:
     return f"{timing.median * 1e6:.2f} ({timing.low * 1e6:.2f} to {timing.high * 1e6:.2f})"
 
 
-def slope(curve: Curve, name: str) -> float:
-    """Additional time for one more unit of work, by least squares over the medians [s].
+def per_unit(curve: Curve, name: str, first: int = 0, last: int | None = None) -> str:
+    """Additional time for one more unit of work between two points of a curve, in words [us].
 
     Args:
         curve: the curve.
         name: driver.
+        first, last: indices of the points; the last is that of the curve unless it is given.
     """
-    times = [timing.median for timing in curve.times[name]]
-    return float(np.polyfit(curve.values[: len(times)], times, 1)[0])
+    times, values = [timing.median for timing in curve.times[name]], curve.values
+    end = len(times) - 1 if last is None else last
+    return f"{(times[end] - times[first]) / (values[end] - values[first]) * 1e6:.2f}"
 
 
 def main(
@@ -210,10 +212,11 @@ def main(
         megabytes=f"{env.bytes_per_environment * sizes.values[-1] / 1e6:.0f}",
         largest_vehicle=VEHICLES[-1],
         most=MAX_HOLES,
-        lone=f"{slope(vehicles, 'one environment, nobody') * 1e6:.2f}",
-        vehicle=f"{slope(vehicles, 'nobody') * 1e6:.2f}",
-        stage=f"{slope(stages, 'nobody') * 1e6:.2f}",
-        both=f"{slope(stages, 'driver in the kernel') * 1e6:.2f}",
+        vehicle=per_unit(vehicles, "nobody"),
+        lone=per_unit(vehicles, "one environment, nobody", last=VEHICLES.index(MAX_HOLES)),
+        beyond=per_unit(vehicles, "one environment, nobody", first=VEHICLES.index(MAX_HOLES) + 1),
+        stage=per_unit(stages, "nobody"),
+        both=per_unit(stages, "driver in the kernel"),
         versions=f"Python {platform.python_version()}, {packages}",
     )
     (out / "speed.md").write_text(text)

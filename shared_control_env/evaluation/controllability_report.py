@@ -45,7 +45,7 @@ def write_report(study: Study, result: Controllability, path: Path, folder: Resu
             plots.append(
                 (f"Controllability curves: {driver}", svg_of(draw_curves(study, result, driver), f"curves{i}"))
             )
-            plots.append((f"Margin against effort: {driver}", svg_of(draw_pareto(result, driver), f"pareto{i}")))
+            plots.append((f"Margin against effort: {driver}", svg_of(draw_pareto(study, result, driver), f"pareto{i}")))
     failed = result.episodes[result.episodes["terminated"].astype(bool)]
     page = environment.get_template("controllability.html.j2").render(
         study=study,
@@ -137,11 +137,12 @@ def _of(table: pd.DataFrame, driver: str, fault: str) -> list[dict[str, Any]]:
     return chosen.to_dict("records")  # type: ignore[return-value]
 
 
-def draw_pareto(result: Controllability, driver: str) -> Figure:
+def draw_pareto(study: Study, result: Controllability, driver: str) -> Figure:
     """Draw margin against effort: up and to the left is better; what no other authority beats in both is connected.
 
     Args:
-        result: result of the study.
+        study: the study.
+        result: its result.
         driver: name of the driver.
     """
     table = result.ranking[result.ranking["driver"] == driver]
@@ -149,8 +150,9 @@ def draw_pareto(result: Controllability, driver: str) -> Figure:
     table = table[table["baseline"] == baseline].sort_values("more_effort")
     figure = Figure(figsize=(8.5, 5.0), layout="constrained")
     axis = figure.subplots()
-    for i, row in enumerate(table.to_dict("records")):
-        colour = COLOURS[i % len(COLOURS)]
+    look = looks(study)
+    for row in table.to_dict("records"):
+        colour = look[row["authority"]]["color"]
         x, y = row["more_effort"], row["margin"]
         axis.errorbar(
             x,

@@ -66,9 +66,10 @@ def test_every_scenario_is_timed_with_every_driver(monkeypatch):
 
 
 def test_the_page_on_the_cost_of_a_step(monkeypatch, tmp_path):
+    monkeypatch.setattr(cost, "VEHICLES", (0, 8, 12, 20))
     work = {name: (values[:2], of) for name, (values, of) in cost.WORK.items()}
+    work["other vehicles"] = cost.VEHICLES, cost.WORK["other vehicles"][1]
     monkeypatch.setattr(cost, "WORK", work)
-    monkeypatch.setattr(cost, "VEHICLES", work["other vehicles"][0])
     monkeypatch.setattr(cost, "N", 4)
     monkeypatch.setattr(cost, "block", partial(vectors.block, steps=5))
     cost.main(repeats=3, out=tmp_path)

@@ -231,8 +231,8 @@ def controllability(
     wide = int((~table["settled"]).sum())
     if wide:
         console.print(
-            f"{wide} of {len(table)} intervals are wider than {width:g} of the grid; a larger --budget narrows them. That is "
-            "another study: name another --out, or replace this one (--fresh)."
+            f"{wide} of {len(table)} intervals are wider than {width:g} of the grid; a larger --budget narrows them. "
+            "That is another study: name another --out, or replace this one (--fresh)."
         )
     console.print(f"The report is {out / REPORT}, the margins {out / MARGINS[0]}.", markup=False)
 

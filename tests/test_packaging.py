@@ -1,3 +1,4 @@
+import os
 import subprocess
 import sys
 import zipfile
@@ -14,7 +15,8 @@ def wheel(tmp_path_factory):
     # Only what git knows, as a release would be built from.
     subprocess.run(["git", "clone", "-q", str(ROOT), str(source)], check=True)
     out = source / "dist"
-    command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(out), str(source)]
+    # The source distribution first, and the wheel from that alone.
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(source)]
     result = subprocess.run(command, capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
     (path,) = out.glob("*.whl")
@@ -40,8 +42,13 @@ def test_wheel_runs_from_a_read_only_folder(wheel, tmp_path):
         "import shared_control_env\n"
         "assert shared_control_env.__file__.startswith(sys.argv[1])\n"
         "assert wrap_angle(4.0) < 0.0\n"
+        "import gymnasium as gym\n"
+        "for name in ('TwoLane', 'Recorded'):\n"
+        "    env = gym.make(f'SharedControl/{name}-v1'); env.reset(seed=0); env.step(env.action_space.sample())\n"
+        "from shared_control_env.learned.shipped import learned_driver; learned_driver()\n"
     )
-    subprocess.run([sys.executable, "-c", code, str(site)], check=True)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    subprocess.run([sys.executable, "-c", code, str(site)], check=True, cwd=tmp_path, env=environment)
     for path in [site, *site.rglob("*")]:
         path.chmod(0o755 if path.is_dir() else 0o644)
 

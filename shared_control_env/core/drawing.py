@@ -35,9 +35,11 @@ class Drawing(NamedTuple):
         low, span: ends of the draws and high minus low, shape (E,); unused for a choice.
         choices: values of the choices, shape (E, n).
         counts: number of choices, shape (E,); 0 for a draw between ends.
+        given: index of a setting's value among those drawn for the person in Python; -1 for the others, shape (E,).
         first: index of a setting's first target; its targets end before that of the next, shape (E + 1,).
         arrays, places: array and index in it of each target.
-        parameters, plans, numbers: the start without the draws, as arrays of numbers; records as double words.
+        parameters: parameters without the draws, as double words, of each person who may drive, shape (P, n).
+        plans, numbers: plans, as double words, and numbers of the start without the draws.
         segments: number of segments of the road.
         faults: faults of the settings, records of :class:`core.parameters.DegradationParameters`, shape (m,).
         seeds: how each of these gets its seed, shape (m,).
@@ -54,6 +56,7 @@ class Drawing(NamedTuple):
     span: np.ndarray
     choices: np.ndarray
     counts: np.ndarray
+    given: np.ndarray
     first: np.ndarray
     arrays: np.ndarray
     places: np.ndarray
@@ -71,6 +74,20 @@ class Drawing(NamedTuple):
     signed: np.ndarray
     lasting: np.ndarray
     seeded: np.ndarray
+
+
+class Persons(NamedTuple):
+    """What is drawn in Python for the persons of N environments; empty arrays where nobody is at the wheel.
+
+    Attributes:
+        which: index of the person in the tables, shape (N,).
+        values: drawn settings, shape (N, n).
+        seeds: seed of the person, shape (N,).
+    """
+
+    which: np.ndarray
+    values: np.ndarray
+    seeds: np.ndarray
 
 
 @jit
@@ -92,6 +109,7 @@ def draw_starts(
     parameters: np.ndarray,
     plans: np.ndarray,
     drawing: Drawing,
+    persons: Persons,
     numbers: np.ndarray,
     thread: int,
     threads: int,
@@ -104,27 +122,38 @@ def draw_starts(
         batch: the starts are written, except for parameters and plans.
         parameters, plans: the batch's parameters and plans as double words, written, shapes (N, n) and (N, m).
         drawing: the tables.
+        persons: what is drawn for the persons.
         numbers: scratch of each thread, shape (threads, n).
         thread, threads: index of this thread, and number of threads.
     """
     own = numbers[thread]
     for i in range(thread, mask.shape[0], threads):
         if mask[i]:
-            _draw_settings(streams[i], parameters[i], plans[i], own, drawing)
+            _draw_settings(i, streams[i], parameters[i], plans[i], own, drawing, persons)
+            if persons.which.shape[0] > 0:
+                batch.parameters[i].person.seed = persons.seeds[i]
             _draw_faults(streams[i], batch.faults[i], drawing)
             place(own, drawing.segments, batch.lines[i], batch.states[i], batch.traffic[i])
 
 
 @jit
 def _draw_settings(
-    stream: np.ndarray, parameters: np.ndarray, plans: np.ndarray, numbers: np.ndarray, drawing: Drawing
+    i: int,
+    stream: np.ndarray,
+    parameters: np.ndarray,
+    plans: np.ndarray,
+    numbers: np.ndarray,
+    drawing: Drawing,
+    persons: Persons,
 ) -> None:
     """Copy the start, and write the drawn settings to their places."""
-    _copy(drawing.parameters, parameters)
+    _copy(drawing.parameters[persons.which[i] if persons.which.shape[0] > 0 else 0], parameters)
     _copy(drawing.plans, plans)
     _copy(drawing.numbers, numbers)
     for e in range(drawing.low.shape[0]):
-        if drawing.counts[e] > 0:
+        if drawing.given[e] >= 0:
+            value = persons.values[i, drawing.given[e]]
+        elif drawing.counts[e] > 0:
             value = drawing.choices[e, integer(stream, drawing.counts[e])]
         else:
             value = drawing.low[e] + drawing.span[e] * random(stream)

@@ -11,9 +11,10 @@ import numpy as np
 from shared_control_env.core.batch import Sizes
 from shared_control_env.core.drawing import DISCARDED, GIVEN, NUMBERS, PARAMETERS, PLANS, TAKEN, Drawing
 from shared_control_env.core.faults.kinds import KINDS
-from shared_control_env.core.parameters import DegradationParameters, Limits, TrafficParameters
+from shared_control_env.core.parameters import PERSONS, DegradationParameters, Limits, TrafficParameters
 from shared_control_env.core.records import pack, record_dtype
 from shared_control_env.envs.degradations import DEGRADATIONS, Degradation, bound_of, fault_of
+from shared_control_env.envs.episode import concerns_driver, of_person
 from shared_control_env.envs.settings import (
     RandomSettings,
     Settings,
@@ -24,7 +25,7 @@ from shared_control_env.envs.settings import (
     plan_records,
 )
 from shared_control_env.envs.settings.changes import at
-from shared_control_env.envs.settings.checks import assigned, ends_of
+from shared_control_env.envs.settings.checks import RESTING, assigned, ends_of
 from shared_control_env.envs.settings.schema import MOST_FAULTS
 from shared_control_env.envs.starts import numbers_of
 
@@ -35,18 +36,22 @@ SECTIONS = ("ego", "vehicles", "lane_change", "task", "driver_lag")
 def drawing_of(settings: Settings, sizes: Sizes) -> Drawing | None:
     """Tables for drawing the episodes of an environment; None where they are drawn in Python.
 
-    In Python are drawn: a person, a recording, and values that do not simply appear in the start, such as the number of
-    lanes; and everything where a combination of drawn values might be refused.
+    In Python are drawn: a recording; values that do not simply appear in the start, such as the number of lanes; and
+    everything where a combination of drawn values might be refused. The numbers of a person come from a generator that
+    each episode makes anew; they are drawn in Python and given to the compiled code (:class:`core.drawing.Persons`).
 
     Args:
         settings: settings of the environment.
         sizes: capacity of the arrays for a start.
     """
     simple = all(_is_simple(entry, settings) for entry in settings.randomise)
-    if settings.has_person or settings.recording is not None or not simple or not _never_refused(settings):
+    if settings.recording is not None or not simple:
         return None
-    targets = _targets(settings)
-    if targets is None:
+    variants = _variants(settings)
+    if variants is None or not all(map(_never_refused, variants)):
+        return None
+    targets = _targets(variants[0])
+    if targets is None or any(_targets(variant) != targets for variant in variants[1:]):
         return None
     randomise, n = settings.randomise, max((len(entry.choices or ()) for entry in settings.randomise), default=0)
     choices = np.zeros((len(randomise), n))
@@ -55,23 +60,37 @@ def drawing_of(settings: Settings, sizes: Sizes) -> Drawing | None:
     plans = np.zeros(sizes.vehicles, record_dtype(TrafficParameters))
     plans[: len(settings.vehicles)] = plan_records(settings)
     flat = [target for own in targets for target in own]
+    mine = [settings.has_person and concerns_driver(entry) for entry in randomise]
     return Drawing(
         low=np.array([entry.low or 0.0 for entry in randomise]),
         span=np.array([(entry.high or 0.0) - (entry.low or 0.0) for entry in randomise]),
         choices=choices,
         counts=np.array([len(entry.choices or ()) for entry in randomise], dtype=np.int64),
+        given=np.where(mine, np.cumsum(mine) - 1, -1).astype(np.int64),
         first=np.cumsum([0, *map(len, targets)]),
         arrays=np.array([array for array, _ in flat], dtype=np.int64),
         places=np.array([place for _, place in flat], dtype=np.int64),
-        parameters=_words(pack(parameters_of(settings))),
+        parameters=np.array([_words(pack(parameters_of(variant))) for variant in variants]),
         plans=_words(plans),
         numbers=numbers_of(settings),
         segments=1 + len(settings.road.segments),
         faults=fault_records(settings),
         seeds=np.array([_seed_of(fault) for fault in settings.faults], dtype=np.int64),
         nothing=np.zeros(1, record_dtype(DegradationParameters)),
-        **_degradations(settings),
+        **_degradations(variants[0]),
     )
+
+
+def _variants(settings: Settings) -> list[Settings] | None:
+    """The settings with each person who may drive; None if one of them is refused."""
+    if not settings.persons:
+        return [settings]
+    config = {**plain(settings), "persons": []}
+    chosen = [of_person({**PERSONS[name]._asdict(), "seed": 0}) for name in settings.persons]
+    try:
+        return [check({**config, "person": person}) for person in chosen]
+    except ValueError:
+        return None
 
 
 def _words(records: np.ndarray) -> np.ndarray:
@@ -86,10 +105,11 @@ def _seed_of(fault: Any) -> int:
 
 
 def _is_simple(entry: RandomSettings, settings: Settings) -> bool:
-    """Whether an entry draws a number that is no integer, between two ends or of choices, in a section looked at."""
+    """Whether an entry draws a number that is no integer, in a section looked at; log-normal ones only of a person."""
     path = entry.setting.split(".")
-    looked_at = path[0] in SECTIONS or (path[0] == "road" and path[-1] == "curvature")
-    return looked_at and entry.median is None and not isinstance(at(plain(settings), tuple(path)), int)
+    mine = settings.has_person and concerns_driver(entry) and path[-1] not in RESTING
+    looked_at = mine or path[0] in SECTIONS or (path[0] == "road" and path[-1] == "curvature")
+    return looked_at and (mine or entry.median is None) and not isinstance(at(plain(settings), tuple(path)), int)
 
 
 def _never_refused(settings: Settings) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import exp
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -52,15 +53,18 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
     config = plain(settings)
     if settings.recording is not None:
         _draw_recording(config, settings, rng)
-    own = rng.spawn(1)[0] if settings.has_person else rng
-    if settings.persons:
-        person = PERSONS[settings.persons[int(own.integers(len(settings.persons)))]]
-        config["person"], config["persons"] = {**person._asdict(), "seed": settings.person.seed}, []
+    driver = DriverDraws.of(settings).draw(driver_generator(rng)) if settings.has_person else None
+    if driver is not None and settings.persons:
+        config["person"], config["persons"] = {**PERSONS[settings.persons[driver.which]]._asdict(), "seed": None}, []
+    values = iter(() if driver is None else driver.values)
     for entry in settings.randomise:
-        _draw_setting(config, entry, own if _concerns_driver(entry) else rng)
-    if settings.persons and config["person"]["engaged"]:
-        attentive = PersonParameters()._asdict()  # what only resting hands wait for does not concern this person
-        config["person"].update({name: attentive[name] for name in RESTING})
+        own = driver is not None and concerns_driver(entry)
+        path = tuple(entry.setting.split("."))
+        value = next(values) if own else draw_value(entry, at(config, path), rng)
+        section, last = at(config, path[:-1]), path[-1]
+        section[int(last) if isinstance(section, list) else last] = value
+    if settings.persons:
+        config["person"] = of_person(config["person"])
     drawn: list[dict[str, Any]] = []
     if settings.degradations:
         name = settings.degradations[int(rng.integers(len(settings.degradations)))]
@@ -70,8 +74,8 @@ def draw_episode(settings: Settings, rng: np.random.Generator) -> Settings:
             seed = int(rng.integers(2**31))  # drawn for every kind, so that later draws do not depend on the kind
             if KINDS[fault["kind"]].draws:
                 fault["seed"] = seed
-    if settings.has_person and settings.person.seed is None:
-        config["person"]["seed"] = int(own.integers(2**31))
+    if driver is not None:
+        config["person"]["seed"] = driver.seed
     config["faults"] += drawn
     config["randomise"], config["degradations"] = [], []
     return check(config)
@@ -91,25 +95,100 @@ def _draw_recording(config: dict[str, Any], settings: Settings, rng: np.random.G
         config[section].update(values)
 
 
-def _concerns_driver(entry: RandomSettings) -> bool:
+class DriverDraw(NamedTuple):
+    """What is drawn for the person at the wheel.
+
+    Attributes:
+        which: index in ``persons``; 0 if there is no choice.
+        values: values of those entries of ``randomise`` that concern the driver, in their order.
+        seed: seed of the person.
+    """
+
+    which: int
+    values: list[float]
+    seed: int
+
+
+def driver_generator(rng: np.random.Generator) -> np.random.Generator:
+    """A separate generator for the person: a seed then gives the same road, traffic and faults for every driver.
+
+    Args:
+        rng: generator of the environment, whose own numbers stay the same.
+    """
+    (own,) = rng.spawn(1)
+    return own
+
+
+class DriverDraws(NamedTuple):
+    """What is to be drawn for the person at the wheel, found once.
+
+    Attributes:
+        persons: number of persons of whom one is chosen.
+        entries: entries of ``randomise`` that concern the driver, each with the setting's value without the draw.
+        seed: seed of the person; None to draw it.
+    """
+
+    persons: int
+    entries: list[tuple[RandomSettings, Any]]
+    seed: int | None
+
+    @classmethod
+    def of(cls, settings: Settings) -> DriverDraws:
+        """What the settings say.
+
+        Args:
+            settings: settings of the environment, with a person.
+        """
+        config = plain(settings)
+        mine = [entry for entry in settings.randomise if concerns_driver(entry)]
+        entries = [(entry, at(config, tuple(entry.setting.split(".")))) for entry in mine]
+        return cls(len(settings.persons), entries, settings.person.seed)
+
+    def draw(self, own: np.random.Generator) -> DriverDraw:
+        """Draw the person of an episode.
+
+        Args:
+            own: generator of the person.
+        """
+        which = int(own.integers(self.persons)) if self.persons else 0
+        values = [draw_value(entry, present, own) for entry, present in self.entries]
+        return DriverDraw(which, values, int(own.integers(2**31)) if self.seed is None else self.seed)
+
+
+def of_person(person: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a person without those that do not concern one who drives from the start.
+
+    Args:
+        person: settings of the person.
+    """
+    attentive = PersonParameters()._asdict()
+    return {**person, **{name: attentive[name] for name in RESTING if person["engaged"]}}
+
+
+def concerns_driver(entry: RandomSettings) -> bool:
+    """Whether an entry of ``randomise`` draws a setting of the driver.
+
+    Args:
+        entry: the entry.
+    """
     return entry.setting.split(".")[0] in ("driver", "driver_lag", "internal_model", "person")
 
 
-def _draw_setting(config: dict[str, Any], entry: RandomSettings, rng: np.random.Generator) -> None:
-    """Draw one setting of a plain dict in place. An integer setting gets an integer, both ends included."""
-    *path, last = entry.setting.split(".")
-    section = at(config, tuple(path))
-    place: Any = int(last) if isinstance(section, list) else last
+def draw_value(entry: RandomSettings, present: Any, rng: np.random.Generator) -> float:
+    """Draw the value of a setting. An integer setting gets an integer, both ends included.
+
+    Args:
+        entry: entry of ``randomise``.
+        present: the setting's value without the draw.
+        rng: generator.
+    """
     if entry.choices:
-        section[place] = entry.choices[int(rng.integers(len(entry.choices)))]
-        return
+        return entry.choices[int(rng.integers(len(entry.choices)))]
     if entry.median is not None and entry.spread is not None:
         deviation = min(max(float(rng.standard_normal()), -CUT_OFF), CUT_OFF)
-        section[place] = entry.median * exp(entry.spread * deviation)
-        return
+        return entry.median * exp(entry.spread * deviation)
     assert entry.low is not None
     assert entry.high is not None  # the check of the settings ensures this
-    if isinstance(section[place], int):
-        section[place] = int(rng.integers(int(entry.low), int(entry.high), endpoint=True))
-    else:
-        section[place] = float(rng.uniform(entry.low, entry.high))
+    if isinstance(present, int):
+        return int(rng.integers(int(entry.low), int(entry.high), endpoint=True))
+    return float(rng.uniform(entry.low, entry.high))

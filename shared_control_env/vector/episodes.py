@@ -9,16 +9,20 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from shared_control_env.core.batch import Batch, Sizes
-from shared_control_env.core.drawing import Drawing, draw_starts
+from shared_control_env.core.drawing import Drawing, Persons, draw_starts
 from shared_control_env.core.stream import WORDS, set_state, state_of
 from shared_control_env.envs.drawing import drawing_of
-from shared_control_env.envs.episode import draw_episode, is_random
+from shared_control_env.envs.episode import DriverDraws, draw_episode, driver_generator, is_random
 from shared_control_env.envs.settings import Settings
 from shared_control_env.envs.starts import start_of, write_start
 from shared_control_env.vector.threads import Threads
 
 FEWEST_FOR_THREADS = 256
 """Smallest number of starts that several threads draw; waking a thread costs as much as drawing so many."""
+
+
+NOBODY = Persons(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, np.int64))
+"""Persons where nobody is at the wheel."""
 
 
 class Episodes(Sequence[Settings]):
@@ -46,7 +50,10 @@ class Episodes(Sequence[Settings]):
         self._given = np.zeros(n, dtype=bool)  # whether the generator is in a user's hands too
         self._drawn = np.zeros(n, dtype=object)  # settings; None where they are to be drawn again
         self._source = np.zeros(n, dtype=object)  # settings that these are drawn from
+        self._roots = np.zeros(n, dtype=object)  # seed sequence that a person's generator came from, and its count
         self._drawing: Drawing | None = None
+        self._driver: DriverDraws | None = None
+        self._persons = NOBODY
 
     def __len__(self) -> int:
         """Number of environments."""
@@ -57,7 +64,7 @@ class Episodes(Sequence[Settings]):
         if isinstance(i, slice):
             return [self[j] for j in range(*i.indices(len(self)))]
         if self._drawn[i] is None:
-            generator = np.random.default_rng()
+            generator = np.random.default_rng(self._roots[i] or None)
             set_state(generator, self._before[i])
             self._drawn[i] = draw_episode(self._source[i], generator)
         return self._drawn[i]
@@ -89,6 +96,12 @@ class Episodes(Sequence[Settings]):
         first = self.templates[0]
         shared = is_random(first) and all(template is first for template in self.templates)
         self._drawing = drawing_of(first, sizes) if shared else None
+        self._driver = DriverDraws.of(first) if self._drawing is not None and first.has_person else None
+        if self._driver is not None:
+            n, entries = len(self), len(self._driver.entries)
+            self._persons = Persons(np.zeros(n, np.int64), np.zeros((n, entries)), np.zeros(n, np.int64))
+        else:
+            self._persons = NOBODY
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling, without the tables, which hold addresses of this process."""
@@ -151,10 +164,25 @@ class Episodes(Sequence[Settings]):
         self._before[chosen] = self._streams[chosen]
         self._in_stream[chosen] = True
         self._drawn[chosen], self._source[chosen] = None, self.templates[0]
+        if self._driver is not None:
+            self._draw_persons(self._driver, chosen.tolist())
         batch.ended[mask] = True
         self._draw_compiled(mask, batch, threads, threads.count if len(chosen) >= FEWEST_FOR_THREADS else 1)
         for i in chosen[self._given[chosen]].tolist():
             self._generator(i)
+
+    def _draw_persons(self, driver: DriverDraws, chosen: list[int]) -> None:
+        """Draw the persons of environments; a copy of the seed sequence as it is now draws them again when asked."""
+        persons = self._persons
+        for i in chosen:
+            generator = self._generators[i]
+            assert generator is not None
+            root: Any = generator.bit_generator.seed_seq
+            self._roots[i] = np.random.SeedSequence(
+                root.entropy, spawn_key=root.spawn_key, n_children_spawned=root.n_children_spawned
+            )
+            drawn = driver.draw(driver_generator(generator))
+            persons.which[i], persons.values[i], persons.seeds[i] = drawn.which, drawn.values, drawn.seed
 
     def _draw_compiled(self, mask: np.ndarray, batch: Batch, threads: Threads, count: int) -> None:
         drawing = self._drawing
@@ -165,7 +193,7 @@ class Episodes(Sequence[Settings]):
         numbers = np.empty((count, len(drawing.numbers)))
 
         def work(thread: int) -> None:
-            draw_starts(mask, self._streams, batch, parameters, plans, drawing, numbers, thread, count)
+            draw_starts(mask, self._streams, batch, parameters, plans, drawing, self._persons, numbers, thread, count)
 
         if count > 1:
             threads.run(work)

@@ -16,6 +16,9 @@ from shared_control_env.envs.episode import draw_episode
 from shared_control_env.envs.scenarios import SCENARIOS
 from shared_control_env.envs.settings import combined, plain
 from shared_control_env.envs.starts import sizes_for, start_of, write_start
+from shared_control_env.evaluation.catalogue import DRIVERS
+from shared_control_env.vector.episodes import NOBODY, Episodes
+from shared_control_env.vector.threads import Threads
 
 BEND = "SharedControl/Bend-v1"
 N = 60
@@ -38,7 +41,6 @@ COMPILED = {
     "a third lane": ("motorway", {"road": {"lanes": 3}}),
 }
 IN_PYTHON = {
-    "a person": ("bend", {"internal_model": {"active": True}, "persons": ["attentive", "hands_on"]}),
     "a recording": ("recorded", {}),
     "a log-normal value": ("bend", {"randomise": [{"setting": "driver_lag.K_h", "median": 1.0, "spread": 0.1}]}),
     "an integer": ("two_lane", {"randomise": [{"setting": "road.lanes", "choices": [2, 3]}]}),
@@ -84,7 +86,7 @@ def test_the_starts_are_those_of_python(name, changes):
         words = [records.view(np.float64).reshape(N, -1) for records in (ours.parameters, ours.plans)]
         numbers = np.zeros((2, len(drawing.numbers)))
         for thread in range(2):
-            draw_starts(np.ones(N, bool), streams, ours, *words, drawing, numbers, thread, 2)
+            draw_starts(np.ones(N, bool), streams, ours, *words, drawing, NOBODY, numbers, thread, 2)
         np.testing.assert_array_equal(streams, after)
         for field in ("parameters", "states", "lines", "faults", "traffic", "plans"):
             np.testing.assert_array_equal(getattr(ours, field), getattr(theirs, field), err_msg=field)
@@ -157,3 +159,39 @@ def test_a_copy_draws_the_same_episodes():
 def test_many_are_drawn_by_several_threads():
     one, two = (gym.make_vec(BEND, num_envs=600, threads=threads) for threads in (1, 2))
     np.testing.assert_array_equal(one.reset(seed=0)[0], two.reset(seed=0)[0])
+
+
+PERSONS = {
+    "one of three": {"internal_model": {"active": True}, "persons": ["attentive", "hands_on", "hands_off"]},
+    "one of the settings": {"internal_model": {"active": True}, "person": {"active": True, "delay": 0.3}},
+    "one with a seed": {"internal_model": {"active": True}, "person": {"active": True, "seed": 5}},
+}
+
+
+@pytest.mark.parametrize("changes", PERSONS.values(), ids=list(PERSONS))
+@pytest.mark.parametrize("name", ["population", "hands_on"])
+def test_persons_are_those_of_python(changes, name):
+    """With the arms and delays of the catalogue's drivers, over several episodes, and with another generator between."""
+    draws = [dict(draw) for draw in DRIVERS[name].draws]
+    if "delay" in changes.get("person", {}):
+        draws = [draw for draw in draws if draw["setting"] != "person.delay"]
+    own = SCENARIOS["bend"].settings["randomise"]
+    settings = settings_of("bend", {**changes, "randomise": [*own, *draws]})
+    sizes = sizes_for([settings])
+    ours, theirs = empty_batch(N, sizes), empty_batch(N, sizes)
+    episodes, threads = Episodes(N), Threads(1)
+    episodes.adopt([settings] * N, True, sizes, settings)
+    assert episodes._drawing is not None
+    generators = [np.random.default_rng(seed) for seed in range(N)]
+    for i in range(N):
+        episodes.seed(i, np.random.default_rng(i), i)
+    for _ in range(3):
+        expected = [draw_episode(settings, generator) for generator in generators]
+        for i, episode in enumerate(expected):
+            write_start(start_of(episode), theirs, i)
+        episodes.draw(np.ones(N, bool), ours, threads)
+        for field in ("parameters", "states", "lines", "faults", "traffic", "plans"):
+            np.testing.assert_array_equal(getattr(ours, field), getattr(theirs, field), err_msg=field)
+        assert list(episodes) == expected
+    for i, generator in enumerate(generators):
+        assert episodes.generator(i).bit_generator.state == generator.bit_generator.state

@@ -37,7 +37,6 @@ exclude_patterns = ["_build"]
 
 html_theme = "furo"
 html_title = "shared control"
-html_static_path = ["_static"]
 html_extra_path: list[str] = []
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "substitution"]

@@ -71,7 +71,7 @@ def test_intervals_cover_the_truth(curve, independent):
 
 def test_monotone_curves_come_out_monotone():
     dips, rising = 0, 0
-    for seed in range(60):
+    for seed in range(30):
         outcomes = study(logistic(0.5, 0.08), seed, independent=True)
         _, curves = margins_of(outcomes)
         dips += bool(find_dips(outcomes))

@@ -41,9 +41,9 @@ def changed(path, to, **header):
 
 
 def test_intervals_cover_the_papers_drivers(tmp_path):
-    """40 intervals: K_h and T_h of five drivers, each in four studies of eight drives."""
+    """30 intervals: K_h and T_h of five drivers, each in three studies of eight drives."""
     hits = 0
-    for study in range(4):
+    for study in range(3):
         folder = tmp_path / f"{study}"
         for i in range(1, 6):
             recorded(folder, f"mpc_{i}", i, range(1000 * study, 1000 * study + 8))
@@ -53,7 +53,7 @@ def test_intervals_cover_the_papers_drivers(tmp_path):
             estimate, true = box_jenkins(people[f"S{i:02d}"]), IDENTIFIED_DRIVERS[f"driver_{i}"]
             hits += estimate.K_h.low <= true.K_h <= estimate.K_h.high
             hits += estimate.T_h.low <= true.T_h <= estimate.T_h.high
-    assert hits >= 36
+    assert hits >= 27
 
 
 def test_the_table_stands_beside_the_papers(five, tmp_path):

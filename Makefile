@@ -69,7 +69,7 @@ types: $(VENV)/.dev
 	$(BIN)/mypy
 
 test: lint types
-	$(BIN)/python -m pytest -q -n auto $(ARGS)
+	$(BIN)/python -m pytest -q -n auto --dist worksteal $(ARGS)
 
 golden: $(VENV)/.dev
 	$(BIN)/python -m pytest -q tests/golden -k "TwoLane or LaneChange"

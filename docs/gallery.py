@@ -20,7 +20,7 @@ from shared_control_env.evaluation.replay import record, replay_episode
 DRIVER, AUTHORITY, SEED = "internal_model", "proportional", 3
 """What drives in every video."""
 
-SECONDS, EVERY = 5.0, 2
+SECONDS, EVERY = 4.0, 2
 """Duration of an episode [s], and steps per frame."""
 
 VIEW = {"screen_width": 1000, "screen_height": 360, "scaling": 8.0}

@@ -246,9 +246,7 @@ class SharedControlVectorEnv(VectorEnv):
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
         """Seed of each environment; a random seed if none was given."""
-        for i in range(self.num_envs):
-            self._episodes.generator(i)
-        return tuple(seed for seed in self._episodes.seeds if seed is not None)
+        return self._episodes.known_seeds()
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]

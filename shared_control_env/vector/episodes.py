@@ -20,7 +20,6 @@ from shared_control_env.vector.threads import Threads
 FEWEST_FOR_THREADS = 256
 """Smallest number of starts that several threads draw; waking a thread costs as much as drawing so many."""
 
-
 NOBODY = Persons(np.zeros(0, np.int64), np.zeros((0, 0)), np.zeros(0, np.int64))
 """Persons where nobody is at the wheel."""
 
@@ -126,6 +125,12 @@ class Episodes(Sequence[Settings]):
         """
         self._given[i] = True
         return self._generator(i)
+
+    def known_seeds(self) -> tuple[int, ...]:
+        """Seed of each environment; an environment without one gets a random seed."""
+        for i in range(len(self)):
+            self._generator(i)
+        return tuple(seed for seed in self.seeds if seed is not None)
 
     def _generator(self, i: int) -> np.random.Generator:
         generator = self._generators[i]

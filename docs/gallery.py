@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import json
+import re
 import shutil
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from importlib import import_module
 from multiprocessing import get_context
 from os import cpu_count
 from pathlib import Path
@@ -102,6 +106,27 @@ def scenarios() -> str:
         drawn = f"Drawn in each episode: {'; '.join(draws)}.\n\n" if draws else ""
         parts.append(f"## `{entry.id}`\n\n{_sentence(entry.description)}\n\n{drawn}{video(f'scenario-{name}')}\n")
     return "\n".join(parts)
+
+
+def authorities() -> str:
+    """All authorities with their law, and what the documentation of their allocator says, in Markdown."""
+    parts = []
+    for name, entry in AUTHORITIES.items():
+        maker: Any = entry.make.func if isinstance(entry.make, partial) else entry.make
+        text = _told(maker)
+        for name_of_module in re.findall(r":mod:`core\.(authority\.\w+)`", text):
+            module = import_module(f"shared_control_env.core.{name_of_module}")
+            own = [each for each in vars(module).values() if getattr(each, "__module__", None) == module.__name__]
+            with_equations = [_told(each) for each in own if "::" in (inspect.getdoc(each) or "")]
+            text = "\n\n".join([text, inspect.getdoc(module) or "", *with_equations])
+        about = f"{_sentence(entry.description)} Law `{entry.law}`, `{maker.__module__}.{maker.__qualname__}`."
+        parts.append(f"### `{name}`\n\n{about}\n\n```text\n{text}\n```\n")
+    return "\n".join(parts)
+
+
+def _told(thing: Any) -> str:
+    """The documentation of a class or function, without its arguments."""
+    return re.split(r"\n(?:Args|Attributes|Raises|Returns):", inspect.getdoc(thing) or "")[0].strip()
 
 
 def _sentence(text: str) -> str:

@@ -201,7 +201,9 @@ def compare(path: Path, id: str, driver: str, seeds: int, progress: Callable[[in
     """
     entry = with_arm(DRIVERS[driver])
     arms = tuple(draw for draw in entry.draws if draw["setting"].startswith("driver_lag."))
-    entries = {"clone": driver_entry(str(path))._replace(draws=arms), driver: entry}
+    lag = {name: value for name, value in entry.config.items() if name == "driver_lag"}
+    clone = driver_entry(str(path))
+    entries = {"clone": clone._replace(config={**clone.config, **lag}, draws=arms), driver: entry}
     suite = Suite("held-out episodes", (ENVIRONMENTS[id],), (None,))
     numbers = range(HELD_OUT_SEED, HELD_OUT_SEED + seeds)
     table = evaluate(entries, AUTHORITY, suite, seeds=numbers, progress=progress)

@@ -68,12 +68,12 @@ class Recorder(gym.Wrapper):
 
 
 def with_arm(entry: DriverEntry) -> DriverEntry:
-    """A driver whose arm is drawn around the five that the paper identified, as those of the persons are.
+    """A driver whose arm is drawn around the five that the paper identified, unless the entry has an arm of its own.
 
     Args:
         entry: entry of the catalogue.
     """
-    return entry if entry.draws else entry._replace(draws=ARMS)
+    return entry if entry.draws or "driver_lag" in entry.config else entry._replace(draws=ARMS)
 
 
 def recorded_env(id: str, driver: str, entry: DriverEntry) -> gym.Env:

@@ -205,5 +205,17 @@ def test_a_clone_of_a_person_drives_past_the_lag(short, tmp_path):
     assert driver_entry("driver-0").config == {}
 
 
-def test_every_driver_of_the_catalogue_can_be_recorded():
-    assert all(demonstrate.with_arm(entry).draws for entry in DRIVERS.values())
+@pytest.mark.parametrize("name", list(DRIVERS))
+def test_a_recorded_driver_has_an_arm_of_the_population_unless_it_has_its_own(name):
+    entry = demonstrate.with_arm(DRIVERS[name])
+    env = demonstrate.recorded_env(ID, name, entry)
+    lags = []
+    for seed in range(3):
+        env.reset(seed=seed)
+        lags.append(env.unwrapped.episode.driver_lag)
+    env.close()
+    own = DRIVERS[name].config.get("driver_lag")
+    if own is None:
+        assert len({(lag.K_h, lag.T_h) for lag in lags}) == 3
+    else:
+        assert all(getattr(lag, field) == value for lag in lags for field, value in own.items())

@@ -54,7 +54,8 @@ def clips() -> list[Clip]:
         Clip(f"scenario-{name}", name, "none" if "degradations" in entry.settings else None)
         for name, entry in SCENARIOS.items()
     ]
-    return scenarios + [Clip(f"degradation-{name}", "lane_keeping", name) for name in DEGRADATIONS]
+    faults = [name for name, entry in DEGRADATIONS.items() if entry is not None]
+    return scenarios + [Clip(f"degradation-{name}", "lane_keeping", name) for name in faults]
 
 
 def make(folder: Path) -> None:

@@ -29,7 +29,7 @@ from shared_control_env.evaluation.catalogue import DRIVERS
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
-from shared_control_env.learned.card import new_card
+from shared_control_env.learned.card import check_goes_on, new_card
 from shared_control_env.learned.policy import Policy, as_array64, fold
 from shared_control_env.recordings.samples import Samples, joined, samples_of
 from shared_control_env.registration import ENVIRONMENTS
@@ -130,18 +130,10 @@ class Cloning:
     def _go_on(self) -> None:
         """Adopt the checkpoint of the folder, if there is one."""
         path = self._folder / CHECKPOINT
-        if not path.is_file():
-            if self._folder.exists() and any(self._folder.iterdir()):
-                raise ValueError(f"{self._folder} holds files that are no cloning; choose another --out")
+        state = torch.load(path, weights_only=True) if path.is_file() else None
+        check_goes_on(self._folder, state and json.loads(state["card"]), self._card, "cloning")
+        if state is None:
             return
-        state = torch.load(path, weights_only=True)
-        stored = json.loads(state["card"])
-        for name, wanted in json.loads(json.dumps(self._card)).items():
-            if stored.get(name) != wanted:
-                raise ValueError(
-                    f"{self._folder} holds a cloning with {name} = {stored.get(name)!r}, not {wanted!r}; choose "
-                    "another --out"
-                )
         self.done, self.best = state["done"], state["best"]
         for name, part in self._stateful.items():
             part.load_state_dict(state[name])

@@ -20,7 +20,7 @@ from d3rlpy.dataset import MDPDataset
 from d3rlpy.logging import NoopAdapterFactory
 from d3rlpy.preprocessing import StandardObservationScaler
 
-from shared_control_env.learned.card import new_card
+from shared_control_env.learned.card import check_goes_on, new_card
 from shared_control_env.learned.policy import Policy, as_array64, fold
 from shared_control_env.recordings.samples import Samples, joined, samples_of
 
@@ -117,8 +117,7 @@ def progress_of(folder: Path, card: dict[str, Any]) -> int:
         ValueError: if the folder holds something else.
     """
     if not (folder / PROGRESS).is_file():
-        if folder.exists() and any(folder.iterdir()):
-            raise ValueError(f"{folder} holds files that are no learning; choose another --out")
+        check_goes_on(folder, None, card, "learning")
         return 0
     state = json.loads((folder / PROGRESS).read_text())
     if state["card"] != json.loads(json.dumps(card)):

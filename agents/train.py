@@ -35,6 +35,7 @@ from shared_control_env.evaluation.catalogue import choose
 from shared_control_env.evaluation.interrupt import resumable
 from shared_control_env.evaluation.progress import progress_bar
 from shared_control_env.evaluation.storage import write_atomically
+from shared_control_env.learned.card import check_goes_on
 from shared_control_env.learned.policy import Policy
 from shared_control_env.registration import ENVIRONMENTS
 
@@ -136,16 +137,9 @@ class Training:
         self.half_life = self.parameters.pop("half_life")
         self.state: dict[str, Any] = {"card": self.card, "steps": 0, "scores": []}
         self.state |= {"seconds": 0.0, "seconds_in": dict.fromkeys(PARTS, 0.0)}
-        if (folder / PROGRESS).is_file():
-            self.state = json.loads((folder / PROGRESS).read_text())
-            for name, wanted in json.loads(json.dumps(self.card)).items():
-                if self.state["card"].get(name) != wanted:
-                    raise ValueError(
-                        f"{folder} holds a training with {name} = {self.state['card'].get(name)!r}, not {wanted!r}; "
-                        "choose another --out"
-                    )
-        elif folder.exists() and any(folder.iterdir()):
-            raise ValueError(f"{folder} holds files that are no training; choose another --out")
+        stored = json.loads((folder / PROGRESS).read_text()) if (folder / PROGRESS).is_file() else None
+        check_goes_on(folder, stored and stored["card"], self.card, "training")
+        self.state = stored or self.state
 
     def _kept(self, suffix: str) -> Path:
         """A file of the state after the last complete segment."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,29 @@ def new_card(
         "features": [name for name, _ in FEATURES_OF[task]],
         "versions": versions,
     }
+
+
+def check_goes_on(folder: Path, stored: Mapping[str, Any] | None, card: Mapping[str, Any], what: str) -> None:
+    """Check that a folder can take a training: it is empty, or holds the same one, unfinished.
+
+    Args:
+        folder: the folder.
+        stored: card of what the folder holds; None if it holds no such thing.
+        card: card of the training.
+        what: word for it in the error messages, such as ``training``.
+
+    Raises:
+        ValueError: if the folder holds something else; the message names the difference.
+    """
+    if stored is None:
+        if folder.exists() and any(folder.iterdir()):
+            raise ValueError(f"{folder} holds files that are no {what}; choose another --out")
+        return
+    for name, wanted in json.loads(json.dumps(card)).items():  # as a stored card comes back
+        if stored.get(name) != wanted:
+            raise ValueError(
+                f"{folder} holds a {what} with {name} = {stored.get(name)!r}, not {wanted!r}; choose another --out"
+            )
 
 
 def is_direct(card: Mapping[str, Any]) -> bool:

@@ -17,9 +17,6 @@ import numpy as np
 from shared_control_env.evaluation.catalogue import AUTHORITIES
 from shared_control_env.recordings.trial import Trial
 
-MODULE = "shared_control_env"
-"""Module that readers of a dataset import first: a dataset's specification does not name it."""
-
 FUZZY = ("paper", "proportional", "display")
 """Authorities that the environment's own limiter decides; of the others the authority is a part of the action."""
 

@@ -44,7 +44,8 @@ def drawing_of(settings: Settings, sizes: Sizes) -> Drawing | None:
         settings: settings of the environment.
         sizes: capacity of the arrays for a start.
     """
-    simple = all(_is_simple(entry, settings) for entry in settings.randomise)
+    config = plain(settings)
+    simple = all(_is_simple(entry, settings, config) for entry in settings.randomise)
     if settings.recording is not None or not simple:
         return None
     variants = _variants(settings)
@@ -104,12 +105,12 @@ def _seed_of(fault: Any) -> int:
     return TAKEN if KINDS[fault.kind].draws else DISCARDED
 
 
-def _is_simple(entry: RandomSettings, settings: Settings) -> bool:
+def _is_simple(entry: RandomSettings, settings: Settings, config: dict[str, Any]) -> bool:
     """Whether an entry draws a number that is no integer, in a section looked at; log-normal ones only of a person."""
     path = entry.setting.split(".")
     mine = settings.has_person and concerns_driver(entry) and path[-1] not in RESTING
     looked_at = mine or path[0] in SECTIONS or (path[0] == "road" and path[-1] == "curvature")
-    return looked_at and (mine or entry.median is None) and not isinstance(at(plain(settings), tuple(path)), int)
+    return looked_at and (mine or entry.median is None) and not isinstance(at(config, tuple(path)), int)
 
 
 def _never_refused(settings: Settings) -> bool:

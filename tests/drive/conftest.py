@@ -83,9 +83,10 @@ class Page:
         self.until("state", state="ready")
 
     def drive(self, seconds, readings=(0.0, 0.0, 0.0, 0.0)):
-        """Drive for some time, with inputs at 60 Hz; what arrived meanwhile.
+        """Drive for some time or until the episode is over, with inputs at 60 Hz; what arrived meanwhile.
 
-        Where the machine is so busy that an input comes too late, the drive goes on after the pause.
+        What follows the end of the episode is left for the test to receive. Where the machine is so busy that an input
+        comes too late, the drive goes on after the pause.
         """
         got, end = [], time.monotonic() + seconds
         while time.monotonic() < end:
@@ -96,8 +97,10 @@ class Page:
                     got.append(self.receive(left))
                 except TimeoutError:
                     break
-            if got and got[-1].get("state") == "over":
-                break
+                if got[-1].get("state") == "over":
+                    return got
+                if got[-1].get("state") == "paused":
+                    break
             if got and got[-1].get("state") == "paused" and "more than 150 ms" in got[-1]["reason"]:
                 got.pop()
                 self.say(type="resume")

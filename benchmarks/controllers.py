@@ -10,35 +10,81 @@ from scipy.optimize import minimize
 
 from benchmarks.timing import Timing, time_block
 from shared_control_env.core.compile.jit import jit
-from shared_control_env.core.control.automation import cost, solve
-from shared_control_env.core.control.condensing import WORKSPACE
+from shared_control_env.core.control.automation import AUTOMATIONS, enter, roll_out, solve
+from shared_control_env.core.control.block import empty, gather
 from shared_control_env.core.records import MAX_CONTROL
 from shared_control_env.wrappers import DriverModel
 
 
 @jit
+def pose(U: np.ndarray, scenes: np.ndarray, parameters: np.ndarray, iterations: int, automations: Any) -> None:
+    """Let one automation enter a block of its own.
+
+    Args:
+        U: guess of the commands [m/s^2, rad], shape (MAX_CONTROL, 2).
+        scenes, parameters: the scene and the parameters, shape (1,).
+        iterations: number of Gauss-Newton iterations.
+        automations: record of :data:`control.automation.AUTOMATIONS`, a 0-d array, written.
+    """
+    work = automations[()]
+    empty(work.block)
+    enter(0, 0, scenes[0], parameters[0], U, work)
+    work.limit[0] = float(iterations)
+    gather(work.block)
+
+
+@jit
+def solve_posed(scenes: np.ndarray, parameters: np.ndarray, automations: Any) -> None:
+    """Call :func:`core.control.automation.solve` with its record as a 0-d array.
+
+    Args:
+        scenes, parameters: the scene and the parameters, shape (1,).
+        automations: record of :data:`control.automation.AUTOMATIONS`, a 0-d array, written.
+    """
+    solve(scenes, parameters, automations[()])
+
+
+@jit
+def linearise(with_model: bool, scenes: np.ndarray, parameters: np.ndarray, automations: Any) -> None:
+    """Call :func:`core.control.automation.roll_out` with its record as a 0-d array.
+
+    Args:
+        with_model: whether the quadratic model is computed.
+        scenes, parameters: the scene and the parameters, shape (1,).
+        automations: record of :data:`control.automation.AUTOMATIONS`, a 0-d array, written.
+    """
+    roll_out(with_model, scenes, parameters, automations[()])
+
+
 def solve_automation(
-    U: np.ndarray, scene: Any, parameters: Any, iterations: int, work: Any
+    U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, iterations: int, work: np.ndarray
 ) -> tuple[int, int, float, float]:
-    """Call :func:`core.control.automation.solve` with records as 0-d arrays.
+    """Solve one automation's problem with :func:`core.control.automation.solve`.
 
     Args:
         U: commands, start and result [m/s^2, rad], shape (MAX_CONTROL, 2).
         scene, parameters, work: records as 0-d arrays.
         iterations: number of Gauss-Newton iterations.
+
+    Returns:
+        Status, number of iterations, residual and cost.
     """
-    return solve(U, scene[()], parameters[()], iterations, work[()])
+    pose(U, scene.reshape(1), parameters.reshape(1), iterations, work)
+    solve_posed(scene.reshape(1), parameters.reshape(1), work)
+    U[:] = work["block"]["U"][:, :, 0]
+    return int(work["status"][0]), int(work["iterations"][0]), float(work["residual"][0]), float(work["cost"][0])
 
 
-@jit
-def automation_cost(U: np.ndarray, scene: Any, parameters: Any, work: Any) -> float:
-    """Call :func:`core.control.automation.cost` with records as 0-d arrays.
+def automation_cost(U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, work: np.ndarray) -> float:
+    """Cost of commands, see :func:`core.control.automation.roll_out`.
 
     Args:
         U: commands [m/s^2, rad], shape (MAX_CONTROL, 2).
         scene, parameters, work: records as 0-d arrays.
     """
-    return cost(U, scene[()], parameters[()], work[()])
+    pose(U, scene.reshape(1), parameters.reshape(1), 0, work)
+    linearise(False, scene.reshape(1), parameters.reshape(1), work)
+    return float(work["block"]["value"][0])
 
 
 class Gaps(NamedTuple):
@@ -90,7 +136,7 @@ def automation(found: list[np.ndarray], repeats: int) -> tuple[Timing, Timing, G
         Time of the Gauss-Newton iterations, time of SLSQP, and the gaps.
     """
     parameters, scale = parameters_and_limits()
-    work, U = np.zeros((), WORKSPACE), np.zeros((MAX_CONTROL, 2))
+    work, U = np.zeros((), AUTOMATIONS), np.zeros((MAX_CONTROL, 2))
     H_c = int(parameters["automation"]["H_c"])
 
     def ours() -> int:

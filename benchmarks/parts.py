@@ -12,16 +12,17 @@ from numba import njit
 from benchmarks.timing import Timing, time_block
 from shared_control_env.core.authority import fuzzy
 from shared_control_env.core.batch import WORK, Batch, Setup
-from shared_control_env.core.control import automation, driver
-from shared_control_env.core.control.predictive_driver import PROGRAM
-from shared_control_env.core.control.qp.active_set import solve_qp
+from shared_control_env.core.compile.lanes import WIDTH
+from shared_control_env.core.control import automation
+from shared_control_env.core.control.block import empty, gather
+from shared_control_env.core.control.predictive_driver import DRIVE, DRIVER_REPORT, PROGRAM
 from shared_control_env.core.feedback import observation
 from shared_control_env.core.risk.assessment import ASSESS
 from shared_control_env.core.risk.finding import SEARCH, TRIANGULATE
 from shared_control_env.core.world import scene as scenes
 from shared_control_env.core.world import vehicle
 
-triangulate, search, assess = TRIANGULATE.call, SEARCH.call, ASSESS.call
+triangulate, search, assess, drive = TRIANGULATE.call, SEARCH.call, ASSESS.call, DRIVE.call
 
 N = 256
 """Number of environments in one loop."""
@@ -29,8 +30,16 @@ N = 256
 
 @njit
 def _automation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
+    work = works[0].automations
     for i in range(batch.scenes.shape[0]):
-        automation.solve(batch.automations[i].U, batch.scenes[i], batch.parameters[i], 2, works[0].condensing)
+        lane = i % WIDTH
+        if lane == 0:
+            empty(work.block)
+        automation.enter(lane, i, batch.scenes[i], batch.parameters[i], batch.automations[i].U, work)
+        work.limit[lane] = 2.0
+        if lane == WIDTH - 1:
+            gather(work.block)
+            automation.solve(batch.scenes, batch.parameters, work)
 
 
 @njit
@@ -79,7 +88,7 @@ def _fuzzy(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) 
 def _dynamics(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
     for i in range(batch.scenes.shape[0]):
         u = batch.signals[i].u
-        vehicle.plant_step(batch.states[i], u[0], u[1], setup.dt, batch.parameters[i].vehicle, works[0].motion.plant)
+        vehicle.plant_step(batch.states[i], u[0], u[1], setup.dt, batch.parameters[i].vehicle)
 
 
 @njit
@@ -92,23 +101,20 @@ def _observation(batch: Batch, setup: Setup, works: np.ndarray, programs: np.nda
 
 @njit
 def _driver(batch: Batch, setup: Setup, works: np.ndarray, programs: np.ndarray) -> None:
-    g = programs[0]
-    for i in range(batch.scenes.shape[0]):
-        p = batch.parameters[i]
-        driver.build_program(
-            batch.scenes[i],
-            batch.memories[i].u_h_des,
-            batch.memories[i].u_h_act,
-            p,
-            works[0].condensing,
-            g.P,
-            g.q,
-            g.A,
-            g.low,
-            g.high,
+    members, reports = np.empty(WIDTH, np.int64), np.empty(batch.scenes.shape[0], DRIVER_REPORT)
+    for first in range(0, batch.scenes.shape[0], WIDTH):
+        for lane in range(WIDTH):
+            members[lane] = first + lane
+        drive(
+            setup.calls.drive,
+            members,
+            batch.scenes,
+            batch.parameters,
+            batch.memories,
+            batch.persons,
+            programs[0],
+            reports,
         )
-        n, m = driver.count_variables(p), driver.count_rows(p)
-        solve_qp(n, m, g.P, g.q, g.A, g.low, g.high, g.x, g.multipliers, g.active_set)
 
 
 PARTS: dict[str, Callable[..., None]] = {
@@ -143,11 +149,12 @@ def times(repeats: int, id: str = "SharedControl/TwoLane-v1") -> dict[str, Timin
     """
     found = {}
     for name, loop in PARTS.items():
-        env = gym.make_vec(id, num_envs=N, threads=1)
+        env = gym.make_vec(id, num_envs=N, threads=1, driver=loop is _driver)
         env.reset(seed=0)
         rng = np.random.default_rng(0)
         for _ in range(25):
-            env.step(0.1 * rng.normal(size=(N, 2)).clip(-1, 1))
+            action = 0.1 * rng.normal(size=(N, 2)).clip(-1, 1)
+            env.step(np.zeros(N, int) if loop is _driver else action)
         batch, setup = env.unwrapped._batch, env.unwrapped._setup  # type: ignore[attr-defined]
         run = partial(loop, batch, setup, np.zeros(1, WORK), np.zeros(1, PROGRAM))
         found[name] = time_block(partial(_anew, batch, batch.automations.copy(), batch.states.copy(), run), repeats)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import Any
 
 import numpy as np
 
 from shared_control_env.core.compile.jit import jit
+from shared_control_env.core.compile.lanes import WIDTH, load
+from shared_control_env.core.control.qp import box
 from shared_control_env.core.control.qp.active_set import solve_qp
+from shared_control_env.core.control.qp.box import solve_box_qp
 from shared_control_env.core.faults.command import degrade
 from shared_control_env.core.records import record_dtype
 from shared_control_env.core.risk.assessment import ASSESS, assess
@@ -15,6 +19,7 @@ from shared_control_env.core.risk.corridor import new_scratch, search_triangles
 from shared_control_env.core.risk.triangulation import triangulate
 from shared_control_env.core.world.motion import Motion
 from shared_control_env.core.world.scene import holes_in_region, perceive
+from shared_control_env.core.world.vehicle import derivatives, implicit_step, linear_axles, through_step
 
 _assess = ASSESS.call
 
@@ -80,3 +85,51 @@ def solve_qp_array(
 ) -> tuple[int, int, float, float]:
     """:func:`control.qp.active_set.solve_qp`."""
     return solve_qp(n, m, P, q, A, low, high, x, multipliers, work[()])
+
+
+@jit
+def step_of(z: Any, a: float, delta: float, kappa: float, h: float, car: Any) -> Any:
+    heading, wheel = (cos(z[2]), sin(z[2])), (cos(delta), sin(delta))
+    z_next, heading_next, inner = implicit_step(z, heading, a, delta, wheel, kappa, h, car, linear_axles(car))
+    return z_next, derivatives(z, heading, a, delta, wheel, kappa, h, car, z_next, heading_next, inner)
+
+
+def step_with_derivatives(
+    z: np.ndarray, a: float, delta: float, kappa: float, h: float, car: Any
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """One implicit step on linear tyres: the new state, and its derivatives by the state and by the command."""
+    z_next, by = step_of(tuple(map(float, z)), float(a), float(delta), float(kappa), h, car)
+    A, B = np.zeros((6, 6)), np.array([by.a, by.delta]).T
+    A[0, 0] = 1.0
+    A[:3, 1], A[:3, 2], A[:, 3], A[:, 4], A[:, 5] = by.y, by.psi, by.v_x, by.v_y, by.r
+    return np.array(z_next), A, B
+
+
+@jit
+def through(x: Any, step: Any) -> Any:
+    return through_step(x, step)
+
+
+def change_through_step(
+    x: np.ndarray, z: np.ndarray, a: float, delta: float, kappa: float, h: float, car: Any
+) -> np.ndarray:
+    """Change of the state after an implicit step, for a change x of the state before."""
+    step = step_of(tuple(map(float, z)), float(a), float(delta), float(kappa), h, car)[1]
+    return np.array(through(tuple(map(float, x)), step))
+
+
+@jit
+def box_in_lanes(n: int, H: Any, g: Any, low: Any, high: Any, wanted: Any, x: Any, work: Any) -> None:
+    solve_box_qp(n, H, g, low, high, load(wanted) > 0.0, x, work[()])
+
+
+def solve_box(H: np.ndarray, g: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Minimisers of programs with bounds, one for each lane: H is (lanes, n, n), the others are (lanes, n)."""
+    count, n = g.shape
+    spread = lambda array: np.ascontiguousarray(np.resize(array, (WIDTH, *array.shape[1:])).swapaxes(0, -1))
+    wanted = np.arange(WIDTH) < count
+    matrices = np.ascontiguousarray(np.moveaxis(np.resize(H, (WIDTH, n, n)), 0, -1))
+    x = np.full((n, WIDTH), np.nan)
+    work = np.zeros((), box.WORKSPACE)
+    box_in_lanes(n, matrices, spread(g), spread(low), spread(high), wanted.astype(float), x, work)
+    return x.T[:count]

@@ -9,9 +9,8 @@ import numpy as np
 
 from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import entries
-from shared_control_env.core.control.automation import AUTOMATE, FAILED, automate
-from shared_control_env.core.control.condensing import WORKSPACE
-from shared_control_env.core.records import AUTOMATION_MEMORY
+from shared_control_env.core.control.automation import AUTOMATE, AUTOMATIONS, FAILED, automate
+from shared_control_env.core.records import AUTOMATION_MEMORY, SIGNALS
 
 
 @runtime_checkable
@@ -45,7 +44,7 @@ class Automation:
     def __init__(self, parameters: np.ndarray, memory: np.ndarray | None = None) -> None:
         self._parameters = parameters
         self._memory = np.zeros((), AUTOMATION_MEMORY) if memory is None else memory
-        self._work = np.zeros((), WORKSPACE)
+        self._signals, self._work = np.zeros((), SIGNALS), np.zeros((), AUTOMATIONS)
 
     @property
     def failures(self) -> int:
@@ -67,15 +66,17 @@ class Automation:
             gradient.
         """
         begin = perf_counter()
-        status, iterations, residual = entries.automate(
-            AUTOMATE.address(automate), scene, self._parameters, self._memory, self._work
+        signals = self._signals
+        entries.automate(
+            AUTOMATE.address(automate), scene.reshape(1), self._parameters.reshape(1), self._memory, signals, self._work
         )
+        status = int(signals["status"])
         return Solution(
-            command=self._memory["u_a_des"].copy(),
+            command=signals["u_a_des"].copy(),
             found=status != FAILED,
             status=status,
-            iterations=iterations,
+            iterations=int(signals["iterations"]),
             primal_residual=0.0,
-            dual_residual=residual,
+            dual_residual=float(signals["residual"]),
             time=perf_counter() - begin,
         )

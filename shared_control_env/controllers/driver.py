@@ -14,8 +14,7 @@ from scipy import sparse
 from shared_control_env.controllers.arrays import as_numbers
 from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import entries
-from shared_control_env.core.control.condensing import WORKSPACE
-from shared_control_env.core.control.driver import count_rows, count_variables
+from shared_control_env.core.control.driver import DRIVERS, count_rows, count_variables
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import PERSON_MEMORY, SCENE, pack
 
@@ -118,7 +117,7 @@ class PredictiveDriver:
         n, rows = count_variables(p), count_rows(p)
         self.P, self.q, self.A = np.zeros((n, n)), np.zeros(n), np.zeros((rows, n))
         self.low, self.high = np.zeros(rows), np.zeros(rows)
-        self._work = np.zeros((), WORKSPACE)
+        self._work = np.zeros((), DRIVERS)
         limits = self._parameters["limits"]
         self._bounds = np.array([limits["a_max"], limits["delta_max"]])
         # Entries that may differ from zero, in the order of compressed columns.
@@ -167,7 +166,16 @@ class PredictiveDriver:
         """
         begin = perf_counter()
         entries.build_program(
-            scene, self._last, self._arm, self._parameters, self._work, self.P, self.q, self.A, self.low, self.high
+            scene.reshape(1),
+            self._last,
+            self._arm,
+            self._parameters,
+            self._work,
+            self.P,
+            self.q,
+            self.A,
+            self.low,
+            self.high,
         )
         result = self._solved()
         info = result.info

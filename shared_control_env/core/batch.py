@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from shared_control_env.core.compile.jit import jit_inlined
-from shared_control_env.core.control import condensing
+from shared_control_env.core.compile.lanes import WIDTH
+from shared_control_env.core.control.automation import Automations
 from shared_control_env.core.control.predictive_driver import DRIVER_REPORT
 from shared_control_env.core.feedback.info import INFO
 from shared_control_env.core.parameters import DegradationParameters, Parameters, TrafficParameters
@@ -217,7 +218,9 @@ class Work:
     """Scratch memory of one thread.
 
     Attributes:
-        condensing: scratch of both predictive controllers.
+        members: indices of the environments of a block that make this step, see :mod:`core.kernel`.
+        drivers: indices of those of them that do not begin an episode.
+        automations: the automation's problems of the block.
         finding: scratch of the search for the safe area.
         automation_view: the scene as the automation perceives it.
         motion: scratch of the vehicles' motion.
@@ -225,7 +228,9 @@ class Work:
         command: the driver's desired command ``[a, delta]`` [m/s^2, rad].
     """
 
-    condensing: condensing.Workspace
+    members: Annotated[np.ndarray, (WIDTH,), np.int64]
+    drivers: Annotated[np.ndarray, (WIDTH,), np.int64]
+    automations: Automations
     finding: Finding
     automation_view: Scene
     motion: Motion

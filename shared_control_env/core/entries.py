@@ -14,6 +14,7 @@ from shared_control_env.core.authority import allocators
 from shared_control_env.core.authority.allocators import Situation
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.control import automation, driver, driver_lag, person
+from shared_control_env.core.control.block import empty, gather
 from shared_control_env.core.world import actuator, replay, vehicle
 from shared_control_env.core.world import traffic as traffic_model
 
@@ -24,9 +25,7 @@ _automate, _allocate = automation.AUTOMATE.call, allocators.ALLOCATE.call
 
 
 @jit
-def step_plant(
-    state: np.ndarray, u: np.ndarray, realised: np.ndarray, dt: float, parameters: Boxed, work: np.ndarray
-) -> None:
+def step_plant(state: np.ndarray, u: np.ndarray, realised: np.ndarray, dt: float, parameters: Boxed) -> None:
     """Advance actuators and plant by one step, see :mod:`world.actuator` and :func:`world.vehicle.plant_step`.
 
     Args:
@@ -35,11 +34,10 @@ def step_plant(
         realised: output of the actuators [m/s^2, rad], overwritten, shape (2,).
         dt: step [s].
         parameters: :class:`core.parameters.Parameters`, a 0-d array.
-        work: scratch, shape (2, 6).
     """
     p = parameters[()]
     actuator.actuate(u, dt, p.actuator, realised)
-    vehicle.plant_step(state, realised[0], realised[1], dt, p.vehicle, work)
+    vehicle.plant_step(state, realised[0], realised[1], dt, p.vehicle)
 
 
 @jit
@@ -127,49 +125,58 @@ def clear_automation(memory: Boxed) -> None:
 
 
 @jit
-def automate(address: int, scene: Boxed, parameters: Boxed, memory: Boxed, work: Boxed) -> tuple[int, int, float]:
-    """Compute the automation's desired command, see :func:`control.automation.automate`.
+def automate(
+    address: int, scenes: np.ndarray, parameters: np.ndarray, memory: Boxed, signals: Boxed, automations: Boxed
+) -> None:
+    """Compute one automation's desired command, see :func:`control.automation.automate`.
 
     Args:
         address: address of the compiled function.
-        scene: record of :data:`records.SCENE`, a 0-d array.
-        parameters: :class:`core.parameters.Parameters`, a 0-d array.
-        memory: record of :data:`records.AUTOMATION_MEMORY`, a 0-d array; ``u_a_des`` is written.
-        work: record of :data:`condensing.WORKSPACE`, a 0-d array.
-
-    Returns:
-        Status, number of iterations and residual of the solver.
+        scenes: record of :data:`records.SCENE`, shape (1,).
+        parameters: :class:`core.parameters.Parameters`, shape (1,).
+        memory: record of :data:`records.AUTOMATION_MEMORY`, a 0-d array, updated.
+        signals: record of :data:`records.SIGNALS`, a 0-d array; ``u_a_des`` and the solver's outcome are written.
+        automations: record of :data:`control.automation.AUTOMATIONS`, a 0-d array.
     """
-    return _automate(address, scene[()], parameters[()], memory[()], work[()])
+    work = automations[()]
+    empty(work.block)
+    automation.enter(0, 0, scenes[0], parameters[0], memory[()].U, work)
+    _automate(address, scenes, parameters, work)
+    automation.leave(0, work, memory[()], signals[()])
 
 
 @jit
 def build_program(
-    scene: Boxed,
+    scenes: np.ndarray,
     u_last: np.ndarray,
     u_h_act: np.ndarray,
     parameters: Boxed,
-    work: Boxed,
+    drivers: Boxed,
     P: np.ndarray,
     q: np.ndarray,
     A: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
 ) -> None:
-    """Build the driver's quadratic program, see :func:`control.driver.build_program`.
+    """Build one driver's quadratic program, see :mod:`control.driver`.
 
     Args:
-        scene: record of :data:`records.SCENE`, a 0-d array.
+        scenes: record of :data:`records.SCENE`, shape (1,).
         u_last: the driver's last desired command [m/s^2, rad], shape (2,).
         u_h_act: the driver's present actual command [m/s^2, rad], shape (2,).
         parameters: :class:`core.parameters.Parameters`, a 0-d array.
-        work: record of :data:`condensing.WORKSPACE`, a 0-d array.
+        drivers: record of :data:`control.driver.DRIVERS`, a 0-d array.
         P: quadratic cost, written, shape (n, n) with n = :func:`control.driver.count_variables`.
         q: linear cost, written, shape (n,).
         A: constraint matrix, written, shape (:func:`control.driver.count_rows`, n).
         low, high: bounds of the rows of A, written, one entry per row.
     """
-    driver.build_program(scene[()], u_last, u_h_act, parameters[()], work[()], P, q, A, low, high)
+    work = drivers[()]
+    empty(work.block)
+    driver.enter(0, 0, scenes[0], u_last, u_h_act, parameters[()], work)
+    gather(work.block)
+    driver.condense(scenes, work)
+    driver.program_of(0, parameters[()], work, P, q, A, low, high)
 
 
 @jit

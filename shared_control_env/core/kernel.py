@@ -3,7 +3,7 @@
 A single environment is a batch of size one. :func:`advance` makes whole time steps in compiled code. Some steps need
 Python in between: those with a user-defined automation, with highway-env's own vehicles, with more than MAX_HOLES
 other vehicles, or while every simulation step is recorded. For these, Python calls the parts of a step one after the
-other: :func:`respond`, :func:`look`, :func:`search_among`, :func:`show_automation`, :func:`judge`, :func:`finish`.
+other: :func:`respond`, :func:`show`, :func:`search_among`, :func:`show_automation`, :func:`decide`, :func:`finish`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,10 @@ from shared_control_env.core.authority.allocators import ALLOCATE, Situation
 from shared_control_env.core.batch import Batch, Environment, Outputs, Setup, Work, environment
 from shared_control_env.core.compile.atomics import fetch_add
 from shared_control_env.core.compile.jit import jit, jit_inlined
-from shared_control_env.core.control.automation import clear_automation
-from shared_control_env.core.control.predictive_driver import DRIVE, DriverReport, Program, clear_report
+from shared_control_env.core.compile.lanes import WIDTH
+from shared_control_env.core.control.automation import AUTOMATE, clear_automation, enter, leave
+from shared_control_env.core.control.block import empty
+from shared_control_env.core.control.predictive_driver import DRIVE, Program, clear_report
 from shared_control_env.core.faults.command import clear_faults
 from shared_control_env.core.feedback.info import note_outcome, note_signals
 from shared_control_env.core.feedback.observation import observe
@@ -24,61 +26,59 @@ from shared_control_env.core.loop import (
     clear_memory,
     clear_signals,
     clear_transition,
-    decide_automation,
     degrade_command,
     depart,
     evaluate,
     is_on_road,
+    judge,
+    look,
     move,
-    plan,
     see,
 )
+from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.risk.assessment import ASSESS
 from shared_control_env.core.risk.corridor import Scratch, search_triangles
 from shared_control_env.core.risk.finding import find_area
 from shared_control_env.core.risk.triangulation import MAX_HOLES
 from shared_control_env.core.world.scene import holes_in_region, perceive
 
-allocate, assess, drive = ALLOCATE.call, ASSESS.call, DRIVE.call
-
-TAKEN_AT_ONCE = 4
-"""Number of environments that a thread takes at a time.
-
-It is small, so that the other threads do not wait long for a thread that is delayed.
-"""
+allocate, assess, automate, drive = ALLOCATE.call, ASSESS.call, AUTOMATE.call, DRIVE.call
 
 
 @jit_inlined
-def fill_slots(
-    i: int,
-    commands: np.ndarray,
-    alphas: np.ndarray,
-    e: Environment,
-    setup: Setup,
-    work: Work,
-    program: Program,
-    report: DriverReport,
+def let_drive(
+    i: int, lane: int, commands: np.ndarray, p: Parameters, setup: Setup, work: Work, program: Program
 ) -> None:
-    """Fill both slots of a step, the driver's command and alpha_a, from bound functions or from the action.
-
-    A slot is bound where ``setup.calls`` holds the address of a driver or of an allocator.
+    """Fill the driver's slot of a step, from the bound driver or from the action.
 
     Args:
         i: index of the environment.
+        lane: lane of the bound driver.
         commands: the driver's commands divided by their limits [-], shape (N, 2); ignored where a driver is bound.
-        alphas: authorities of the automation over each channel [-], shape (N, 2); ignored where an allocator is bound.
-        e: environment i; ``signals.alpha``, clipped to [0, 1], and an allocator's ``signals.alert`` are written.
-        setup: what all environments share; its calls say which slots are bound.
+        p: parameters of the environment.
+        setup: what all environments share; its calls say whether a driver is bound.
         work: scratch; ``work.command`` receives the driver's desired command [m/s^2, rad].
-        program: record of :data:`predictive_driver.PROGRAM`; unused where no driver is bound.
-        report: record of :data:`predictive_driver.DRIVER_REPORT`, written where a driver is bound.
+        program: record of :data:`predictive_driver.PROGRAM`, solved where a driver is bound.
     """
     if setup.calls.drive != 0:
-        drive(setup.calls.drive, e.scene, e.p, e.memory, e.person, work.condensing, program, report)
-        work.command[0], work.command[1] = program.command[0], program.command[1]
+        command = program.drivers.command[lane]
+        work.command[0], work.command[1] = command[0], command[1]
     else:
-        work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * e.p.limits.a_max
-        work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * e.p.limits.delta_max
+        work.command[0] = min(max(commands[i, 0], -1.0), 1.0) * p.limits.a_max
+        work.command[1] = min(max(commands[i, 1], -1.0), 1.0) * p.limits.delta_max
+
+
+@jit_inlined
+def let_allocate(i: int, alphas: np.ndarray, e: Environment, setup: Setup, work: Work) -> None:
+    """Fill the allocator's slot of a step, from the bound allocator or from the action.
+
+    Args:
+        i: index of the environment.
+        alphas: authorities of the automation over each channel [-], shape (N, 2); ignored where an allocator is bound.
+        e: environment i; ``signals.alpha``, clipped to [0, 1], and an allocator's ``signals.alert`` are written.
+        setup: what all environments share; its calls say whether an allocator is bound.
+        work: scratch.
+    """
     over_a, over_delta = alphas[i, 0], alphas[i, 1]
     if setup.calls.allocate != 0:
         situation = Situation(
@@ -94,6 +94,31 @@ def fill_slots(
         )
         over_a, over_delta, e.signals.alert = allocate(setup.calls.allocate, situation)
     e.signals.alpha[0], e.signals.alpha[1] = min(max(over_a, 0.0), 1.0), min(max(over_delta, 0.0), 1.0)
+
+
+@jit_inlined
+def ask_drivers(count: int, batch: Batch, setup: Setup, out: Outputs, work: Work, program: Program) -> None:
+    """Let the bound driver, if there is one, decide in the environments ``work.drivers``.
+
+    Args:
+        count: number of these environments.
+        batch: state of all environments.
+        setup: what all environments share.
+        out: outputs of all environments; the reports of these drivers are written.
+        work: scratch.
+        program: record of :data:`predictive_driver.PROGRAM`, written.
+    """
+    if setup.calls.drive != 0 and count > 0:
+        drive(
+            setup.calls.drive,
+            work.drivers[:count],
+            batch.scenes,
+            batch.parameters,
+            batch.memories,
+            batch.persons,
+            program,
+            out.drivers,
+        )
 
 
 @jit
@@ -179,83 +204,82 @@ def write_outputs(i: int, resetting: bool, e: Environment, setup: Setup, out: Ou
 
 
 @jit_inlined
-def advance_one(
-    i: int,
-    resetting: bool,
-    commands: np.ndarray,
-    alphas: np.ndarray,
-    batch: Batch,
-    setup: Setup,
-    out: Outputs,
-    work: Work,
-    program: Program,
-) -> None:
-    """Advance environment i by one time step, or begin its next episode.
+def choose_members(
+    first: int, last: int, active: np.ndarray, autoreset: bool, batch: Batch, work: Work
+) -> tuple[int, int]:
+    """Find the environments of a block that make a step, ``work.members``, and those that drive in it.
 
     Args:
-        i: index of the environment.
-        resetting: whether to begin an episode instead of making a time step.
-        commands: the driver's commands divided by their limits [-], shape (N, 2).
-        alphas: authorities of the automation over each channel [-], shape (N, 2).
-        batch: state of all environments; entry i is written.
-        setup: what all environments share.
-        out: outputs of all environments; the entries of environment i are written.
-        work: scratch of this thread, record of :data:`batch.WORK`.
-        program: record of :data:`predictive_driver.PROGRAM` of this thread.
+        first, last: indices of the first environment of the block and of the one after its last.
+        active: whether each environment is advanced, shape (N,).
+        autoreset: whether an environment whose episode has ended begins the next one in this step.
+        batch: state of all environments.
+        work: scratch; ``members`` and ``drivers`` are written.
+
+    Returns:
+        Numbers of members and of drivers.
     """
-    e = environment(i, batch)
-    k = 0
-    if resetting:
-        begin(i, batch, setup, out)
-    else:
-        k = e.scene.k + 1
-        depart(e)
-        fill_slots(i, commands, alphas, e, setup, work, program, out.drivers[i])
-        act(work.command, e)
-        note(i, e, out)
-        move(e, setup, work)
-    plan(k, e, setup.calls, work)
-    write_outputs(i, resetting, e, setup, out)
+    count = driving = 0
+    for i in range(first, last):
+        if active[i] and (autoreset or not batch.ended[i]):
+            work.members[count] = i
+            count += 1
+            if not batch.ended[i]:
+                work.drivers[driving] = i
+                driving += 1
+    return count, driving
 
 
 @jit_inlined
-def advance_through(
-    i: int,
-    steps: int,
-    autoreset: bool,
+def advance_block(
+    count: int,
+    driving: int,
     commands: np.ndarray,
     alphas: np.ndarray,
     batch: Batch,
     setup: Setup,
     out: Outputs,
-    rewards: np.ndarray,
-    ends: np.ndarray,
     work: Work,
     program: Program,
 ) -> None:
-    """Advance environment i by several consecutive time steps.
+    """Advance the environments ``work.members`` by one time step; those whose episode has ended begin their next one.
 
     Args:
-        i: index of the environment.
-        steps: number of time steps.
-        autoreset: whether to begin the next episode after one has ended (autoreset); if False, stop at the end.
-        commands: the driver's commands divided by their limits [-], shape (N, 2), held over the steps.
-        alphas: authorities of the automation over each channel [-], shape (N, 2), held over the steps.
-        batch: state of all environments; entry i is written.
+        count: number of members.
+        driving: number of those that do not begin an episode, ``work.drivers``.
+        commands: the driver's commands divided by their limits [-], shape (N, 2).
+        alphas: authorities of the automation over each channel [-], shape (N, 2).
+        batch: state of all environments; the entries of the members are written.
         setup: what all environments share.
-        out: outputs of all environments; the entries of environment i are those of its last step.
-        rewards: reward of every step, column i is written, shape (steps, N).
-        ends: whether the episode ended at each step, column i is written, shape (steps, N).
+        out: outputs of all environments; the entries of the members are written.
         work: scratch of this thread, record of :data:`batch.WORK`.
         program: record of :data:`predictive_driver.PROGRAM` of this thread.
     """
-    for k in range(steps):
-        resetting = batch.ended[i]
-        if resetting and not autoreset:
-            break
-        advance_one(i, resetting, commands, alphas, batch, setup, out, work, program)
-        rewards[k, i] = out.rewards[i]
-        ends[k, i] = batch.ended[i] = out.terminations[i] or out.truncations[i]
+    ask_drivers(driving, batch, setup, out, work, program)
+    empty(work.automations.block)
+    driver = 0
+    for lane in range(count):
+        i = work.members[lane]
+        e = environment(i, batch)
+        k = 0
+        if batch.ended[i]:
+            begin(i, batch, setup, out)
+        else:
+            k = e.scene.k + 1
+            depart(e)
+            let_drive(i, driver, commands, e.p, setup, work, program)
+            driver += 1
+            let_allocate(i, alphas, e, setup, work)
+            act(work.command, e)
+            note(i, e, out)
+            move(e, setup, work)
+        look(k, lane, i, e, setup.calls, work)
+    automate(setup.calls.automate, batch.scenes, batch.parameters, work.automations)
+    for lane in range(count):
+        i = work.members[lane]
+        e = environment(i, batch)
+        judge(lane, e, setup.calls, work)
+        write_outputs(i, e.scene.k == 0, e, setup, out)
 
 
 @jit
@@ -278,8 +302,8 @@ def advance(
     """Advance all active environments, each by several consecutive time steps; every thread makes this call.
 
     The environments are divided into as many shares as there are threads. Each thread first takes the environments of
-    its own share, since the cache of its core may still hold them from the previous step. Then it helps with the other
-    shares.
+    its own share, a block at a time, since the cache of its core may still hold them from the previous step. Then it
+    helps with the other shares.
 
     Args:
         taken: number of environments of each share that threads have taken so far, shared by them, shape (threads,).
@@ -303,14 +327,19 @@ def advance(
     for turn in range(shares):
         share = (thread + turn) % shares
         begin_at, end_at = share * n // shares, (share + 1) * n // shares
-        first = begin_at + fetch_add(taken, share, TAKEN_AT_ONCE)
+        first = begin_at + fetch_add(taken, share, WIDTH)
         while first < end_at:
-            for i in range(first, min(first + TAKEN_AT_ONCE, end_at)):
-                if active[i]:
-                    advance_through(
-                        i, steps, autoreset, commands, alphas, batch, setup, out, rewards, ends, work, program
-                    )
-            first = begin_at + fetch_add(taken, share, TAKEN_AT_ONCE)
+            for k in range(steps):
+                last = min(first + WIDTH, end_at)
+                count, driving = choose_members(first, last, active, autoreset, batch, work)
+                if count == 0:
+                    break
+                advance_block(count, driving, commands, alphas, batch, setup, out, work, program)
+                for member in range(count):
+                    i = work.members[member]
+                    rewards[k, i] = out.rewards[i]
+                    ends[k, i] = batch.ended[i] = out.terminations[i] or out.truncations[i]
+            first = begin_at + fetch_add(taken, share, WIDTH)
 
 
 @jit
@@ -334,15 +363,18 @@ def respond(
         works: records of :data:`batch.WORK`; the first is used.
         programs: records of :data:`predictive_driver.PROGRAM`; the first is used.
     """
-    e = environment(0, batch)
+    e, work = environment(0, batch), works[0]
     depart(e)
-    fill_slots(0, commands, alphas, e, setup, works[0], programs[0], out.drivers[0])
-    act(works[0].command, e)
+    work.drivers[0] = 0
+    ask_drivers(1, batch, setup, out, work, programs[0])
+    let_drive(0, 0, commands, e.p, setup, work, programs[0])
+    let_allocate(0, alphas, e, setup, work)
+    act(work.command, e)
     note(0, e, out)
 
 
 @jit
-def look(
+def show(
     k: int, resetting: bool, batch: Batch, setup: Setup, out: Outputs, works: np.ndarray, corners: np.ndarray
 ) -> int:
     """Perceive environment 0's scene at time step k, and find its safe area unless too many vehicles are in the region.
@@ -398,7 +430,7 @@ def show_automation(batch: Batch, works: np.ndarray) -> None:
 
 
 @jit
-def judge(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> None:
+def decide(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> None:
     """Complete the first half of environment 0's time step: the automation's decision, the fault and the risk.
 
     Args:
@@ -408,11 +440,14 @@ def judge(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> Non
         setup: what all environments share.
         works: records of :data:`batch.WORK`; the first is used.
     """
-    e = environment(0, batch)
+    e, work = environment(0, batch), works[0]
     if not automated:
-        decide_automation(see(e, works[0]), e, setup.calls, works[0])
+        empty(work.automations.block)
+        enter(0, 0, see(e, work), e.p, e.automation.U, work.automations)
+        automate(setup.calls.automate, batch.scenes, batch.parameters, work.automations)
+        leave(0, work.automations, e.automation, e.signals)
     degrade_command(e)
-    assess(setup.calls.assess, e.p.task.tau_p, e.scene, e.traffic, e.line, e.p, e.signals, works[0].motion)
+    assess(setup.calls.assess, e.p.task.tau_p, e.scene, e.traffic, e.line, e.p, e.signals, work.motion)
 
 
 @jit

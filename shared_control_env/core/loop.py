@@ -1,9 +1,10 @@
 """The loop of human-machine shared control: one function call per signal, in the order of the paper.
 
-A time step k has two halves. :func:`plan` runs on the perceived scene: the automation decides, the fault acts on the
-command, and the risk of the degraded command is assessed. :func:`act` runs once alpha_a and the driver's command are
-known: it applies the authority law and the driver's lag, and adds both commands. Between the two halves lie the slots
-of the allocator and of the driver, which :mod:`core.kernel` fills::
+A time step k has two halves. The first runs on the perceived scene: :func:`look`, the automation's decision, and
+:func:`judge`, in which the fault acts on the command and the risk of the degraded command is assessed. :func:`act` runs
+once alpha_a and the driver's command are known: it applies the authority law and the driver's lag, and adds both
+commands. Between the two halves lie the slots of the allocator and of the driver. :mod:`core.kernel` fills them, and
+lets the automations of eight environments decide at once::
 
     perceive             scene      road frame, neighbours, driving region, targets
     find_safe_area       C          safe area (Table I)
@@ -17,7 +18,7 @@ of the allocator and of the driver, which :mod:`core.kernel` fills::
     apply_driver         u_h,act    the driver's actual command (Eq. 16)
                          u          command of the vehicle: u_a,act + u_h,act, clipped to the limits
     move                            actuators, vehicle (Eq. 11) and traffic, to k + 1
-    evaluate                        reward and end of the episode, after plan has run at k + 1
+    evaluate                        reward and end of the episode, after judge has run at k + 1
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ import numpy as np
 from shared_control_env.core.authority.laws import apply_law
 from shared_control_env.core.batch import Calls, Environment, Setup, Work
 from shared_control_env.core.compile.jit import jit, jit_inlined
-from shared_control_env.core.control.automation import AUTOMATE
+from shared_control_env.core.control.automation import enter, leave
 from shared_control_env.core.control.driver_lag import advance_lag
 from shared_control_env.core.faults.command import ACTUATOR, PLANNER, degrade
 from shared_control_env.core.faults.perception import misperceive, see_as_automation
@@ -39,22 +40,37 @@ from shared_control_env.core.risk.finding import find_area
 from shared_control_env.core.world.motion import MOVE
 from shared_control_env.core.world.scene import holes_in_region, perceive
 
-automate, assess, move_all = AUTOMATE.call, ASSESS.call, MOVE.call
+assess, move_all = ASSESS.call, MOVE.call
 
 
 @jit_inlined
-def plan(k: int, e: Environment, calls: Calls, work: Work) -> None:
-    """Run the first half of a time step: from the poses of all vehicles to the risk of the automation's command.
+def look(k: int, lane: int, i: int, e: Environment, calls: Calls, work: Work) -> None:
+    """Begin the first half of a time step: from the poses of all vehicles to the automation's problem.
 
     Args:
         k: time step.
+        lane: lane of the block that the automation enters, see :mod:`control.block`.
+        i: index of the environment.
         e: the environment; its scene and signals are written.
         calls: addresses of the compiled functions.
         work: scratch.
     """
     perceive(k, e.state, e.traffic, e.line, e.p, e.scene)
     find_safe_area(e, calls, work)
-    decide_automation(see(e, work), e, calls, work)
+    enter(lane, i, see(e, work), e.p, e.automation.U, work.automations)
+
+
+@jit_inlined
+def judge(lane: int, e: Environment, calls: Calls, work: Work) -> None:
+    """Complete the first half: from the automation's decision to the risk of the degraded command.
+
+    Args:
+        lane: lane of the block that the automation leaves.
+        e: the environment; its signals and the memories of the automation and of the faults are written.
+        calls: addresses of the compiled functions.
+        work: scratch.
+    """
+    leave(lane, work.automations, e.automation, e.signals)
     degrade_command(e)
     assess(calls.assess, e.p.task.tau_p, e.scene, e.traffic, e.line, e.p, e.signals, work.motion)
 
@@ -91,22 +107,6 @@ def see(e: Environment, work: Work) -> Scene:
     work.automation_view = e.scene
     see_as_automation(e.signals.misperception, e.p, work.automation_view)
     return work.automation_view
-
-
-@jit_inlined
-def decide_automation(seen: Scene, e: Environment, calls: Calls, work: Work) -> None:
-    """Compute u_a,des from the scene as the automation perceives it, and report the solver's outcome.
-
-    Args:
-        seen: record of :data:`records.SCENE` as the automation perceives it, see :func:`see`.
-        e: the environment; its signals and the automation's memory are written.
-        calls: addresses of the compiled functions.
-        work: scratch.
-    """
-    signals = e.signals
-    status, iterations, residual = automate(calls.automate, seen, e.p, e.automation, work.condensing)
-    signals.status, signals.iterations, signals.residual = status, iterations, residual
-    signals.u_a_des[0], signals.u_a_des[1] = e.automation.u_a_des[0], e.automation.u_a_des[1]
 
 
 @jit_inlined

@@ -392,7 +392,7 @@ class SharedControlEnv(HighwayEnv):
         for vehicle, row in self._foreign:
             write_row(vehicle, row)
         k = 0 if resetting else int(self.scene["k"]) + 1
-        count = kernel.look(k, resetting, batch, setup, out, works, self._corners)
+        count = kernel.show(k, resetting, batch, setup, out, works, self._corners)
         if count > MAX_HOLES:
             triangles = triangulate_any(self.scene["region"], self._corners[:count])
             kernel.search_among(triangles, batch, new_scratch(len(triangles)))
@@ -402,7 +402,7 @@ class SharedControlEnv(HighwayEnv):
             signals["u_a_des"], signals["residual"] = solution.command, solution.dual_residual
             signals["status"], signals["iterations"] = solution.status, solution.iterations
             batch.automations["failures"][0] = int(getattr(given, "failures", 0))
-        kernel.judge(given is not None, batch, setup, works)
+        kernel.decide(given is not None, batch, setup, works)
         kernel.finish(resetting, batch, setup, out)
 
     def _decided(self, solution: Any) -> Solution:

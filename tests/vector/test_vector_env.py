@@ -10,8 +10,8 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import shared_control_env  # noqa: F401
 from shared_control_env.core.authority.laws import LAWS
+from shared_control_env.core.compile.lanes import WIDTH
 from shared_control_env.core.faults.kinds import KINDS
-from shared_control_env.core.kernel import TAKEN_AT_ONCE
 from shared_control_env.core.risk.safe_area import BLOCKED
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.envs.degradations import DEGRADATIONS
@@ -221,7 +221,7 @@ def test_a_rollout_is_the_steps_in_one_call():
 def test_threads_change_nothing():
     results = []
     for threads in (1, 2, 3):
-        env = gym.make_vec(TWO_LANE, num_envs=5 * TAKEN_AT_ONCE + 3, threads=threads)
+        env = gym.make_vec(TWO_LANE, num_envs=5 * WIDTH + 3, threads=threads)
         env.reset(seed=0)
         rng = np.random.default_rng(0)
         results.append([env.step(random_driver(rng, env))[:4] for _ in range(40)])

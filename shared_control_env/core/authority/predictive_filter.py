@@ -6,7 +6,7 @@ nonlinear dynamical systems, Automatica 129, 2021. Instead of an optimisation ov
 
 from __future__ import annotations
 
-from math import cos, exp, sin
+from math import exp
 
 from shared_control_env.core.authority.alerts import NO_ALERT
 from shared_control_env.core.authority.allocators import Situation
@@ -14,7 +14,7 @@ from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.records import NEAR_SPEED, PRECEDING
 from shared_control_env.core.risk.safe_area import lateral_bounds
 from shared_control_env.core.world.scene import gap_ahead
-from shared_control_env.core.world.vehicle import PSI, V_X, S, Y, implicit_step
+from shared_control_env.core.world.vehicle import PSI, V_X, S, Y, step_in_place
 
 CANDIDATES = 21
 """Number of authorities that are tried, evenly spaced from 1 to 0."""
@@ -60,7 +60,7 @@ def leaves_a_way_back(alpha: float, now: Situation) -> bool:
         u_a = min(max(a + a_h, -p.limits.a_max), p.limits.a_max)
         u_delta = min(max(delta + delta_h, -p.limits.delta_max), p.limits.delta_max)
         kappa = scene.kappa[min(k, p.automation.H_p - 1)]
-        implicit_step(z, (cos(z[PSI]), sin(z[PSI])), u_a, u_delta, (cos(u_delta), sin(u_delta)), kappa, dt, car, z)
+        step_in_place(z, u_a, u_delta, kappa, dt, car)
         low, high = lateral_bounds(scene.area, z[S])
         if z[Y] - half < low or z[Y] + half > high or gap + (k + 1) * dt * v_lead - (z[S] - start) < 0.0:
             return False

@@ -74,6 +74,15 @@ def by_value(kind: Any) -> Any:
     return types.NamedTuple([compiled_type(hint) for hint in get_type_hints(kind, include_extras=True).values()], kind)
 
 
+def array_of(fields_of: type) -> Any:
+    """Numba's type of a one-dimensional array of records.
+
+    Args:
+        fields_of: class of :mod:`core.records` or :mod:`core.parameters` with the fields of a record.
+    """
+    return types.Array(compiled_type(fields_of), 1, "C")
+
+
 class Interface:
     """Signature of a family of functions, any of which compiled code can call by its address.
 

@@ -30,24 +30,47 @@ stages from the first stage on that the driver can still influence; and u_h,des 
 from __future__ import annotations
 
 from math import cos, exp, sin
+from typing import Annotated
 
 import numpy as np
 
 from shared_control_env.core.compile.jit import jit, jit_inlined
-from shared_control_env.core.control.condensing import (
-    Workspace,
+from shared_control_env.core.compile.lanes import WIDTH, Number, choose, holds_in_any, load, spread, store
+from shared_control_env.core.control import block as blocks
+from shared_control_env.core.control.block import (
+    COLUMNS,
+    EFFORT_A,
+    Column,
+    Lane,
     add_effort,
     add_square,
     add_tracking,
-    carry,
     clear,
+    dynamics_of,
     propagate,
+    state_of,
 )
 from shared_control_env.core.control.qp.active_set import UNBOUNDED
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.records import Scene
+from shared_control_env.core.records import MAX_HORIZON, Scene, record_dtype
 from shared_control_env.core.risk.safe_area import lateral_bounds
-from shared_control_env.core.world.vehicle import PSI, V_X, V_Y, R, S, Y, implicit_step_jacobian
+from shared_control_env.core.world.vehicle import (
+    PSI,
+    V_X,
+    V_Y,
+    Derivatives,
+    R,
+    S,
+    State,
+    Y,
+    derivatives,
+    implicit_step,
+    less,
+    linear_axles,
+    plus,
+    through_step,
+    turned,
+)
 
 SLACK_LINEAR = 200.0
 """Linear penalty of a slack [1/m]. The penalty is exact where the sum of the rows' multipliers is smaller.
@@ -90,153 +113,240 @@ def count_variables(p: Parameters) -> int:
     return 2 * p.driver.H_c + SLACKS
 
 
+class Drivers:
+    """The drivers' problems of a block of environments; one record per thread.
+
+    Attributes:
+        block: the block; its weights and horizons are those of Eq. 15. ``U`` is the last desired command at all stages.
+        heading: cosine and sine of the heading at the present.
+        felt: the automation's actual command as felt last [m/s^2, rad].
+        arm: the driver's actual command [m/s^2, rad].
+        last: the driver's last desired command [m/s^2, rad].
+        phi, rise: the arm's response as the internal model has it [-].
+        gain: derivative of the arm's command with respect to U.
+        station: path length at which the rows of C are evaluated [m].
+        side: rows of the sides of C, one for each stage.
+        lower, upper: sides of C less the position for U = 0, at each stage [m].
+        end: row of the end of C.
+        end_of_area: path length at which the front of the car reaches the end of C, less half its length [m].
+        room: that less the path length for U = 0 at the last stage [m].
+        command: the drivers' desired commands ``[a, delta]`` [m/s^2, rad].
+    """
+
+    block: blocks.Block
+    heading: Annotated[np.ndarray, (2, WIDTH)]
+    felt: Annotated[np.ndarray, (2, WIDTH)]
+    arm: Annotated[np.ndarray, (2, WIDTH)]
+    last: Annotated[np.ndarray, (2, WIDTH)]
+    phi: Lane
+    rise: Lane
+    gain: Column
+    station: Lane
+    side: Annotated[np.ndarray, (MAX_HORIZON, COLUMNS, WIDTH)]
+    lower: Annotated[np.ndarray, (MAX_HORIZON, WIDTH)]
+    upper: Annotated[np.ndarray, (MAX_HORIZON, WIDTH)]
+    end: Column
+    end_of_area: Lane
+    room: Lane
+    command: Annotated[np.ndarray, (WIDTH, 2)]
+
+
+DRIVERS = record_dtype(Drivers)
+
+
+@jit
+def enter(
+    lane: int, index: int, scene: Scene, u_last: np.ndarray, u_h_act: np.ndarray, p: Parameters, work: Drivers
+) -> None:
+    """Let the driver of an environment enter a lane.
+
+    Args:
+        lane: index of the lane.
+        index: index of the environment.
+        scene: record of :data:`records.SCENE` as the driver perceives it.
+        u_last: the driver's last desired command [m/s^2, rad], shape (2,).
+        u_h_act: the driver's present actual command u_h,act(k) [m/s^2, rad], shape (2,).
+        p: parameters.
+        work: record of :data:`DRIVERS`, written.
+    """
+    blocks.enter(lane, index, int(p.internal_model.active), scene, p.driver, p, work.block)
+    work.heading[0, lane], work.heading[1, lane] = cos(scene.z[PSI]), sin(scene.z[PSI])
+    for channel in range(2):
+        work.felt[channel, lane], work.arm[channel, lane] = scene.felt[channel], u_h_act[channel]
+        work.last[channel, lane] = u_last[channel]
+    work.phi[lane] = exp(-p.task.dt / p.internal_model.T_h)
+    work.rise[lane] = p.internal_model.K_h * (1.0 - work.phi[lane])
+    work.end_of_area[lane] = scene.area.end - 0.5 * p.model.length
+
+
+@jit
+def condense(scenes: np.ndarray, work: Drivers) -> None:
+    """Compute the quadratic models and the rows of the sides and the end of C, in every lane.
+
+    The paper's model is linearised about the driver's last desired command. The internal model is linearised about the
+    sum of the driver's present actual command and the automation's command as last felt.
+
+    Args:
+        scenes: records of :data:`records.SCENE` with the safe areas, shape (N,).
+        work: record of :data:`DRIVERS`, written.
+    """
+    block, sens = work.block, work.block.sensitivity
+    dt, car = block.dt, dynamics_of(block)
+    axles = linear_axles(car)
+    n, internal = 2 * block.H_c, block.kind == 1
+    start, heading = state_of(block.z), (load(work.heading[0]), load(work.heading[1]))
+    arm_a, arm_delta = load(work.arm[0]), load(work.arm[1])
+    felt_a, felt_delta = load(work.felt[0]), load(work.felt[1])
+    last_a, last_delta = load(work.last[0]), load(work.last[1])
+    a, delta = last_a, last_delta
+    if internal:
+        a, delta = felt_a + arm_a, felt_delta + arm_delta
+    # A command that would stop the car within the step hides that the car can start to move. Linearise at rest instead.
+    stopping = -start[V_X] / dt - start[R] * start[V_Y]
+    a = choose(a < stopping, stopping, a)
+    # The rows of C are evaluated at the path length that the car reaches under this command.
+    expected_a, expected_delta = (last_a, last_delta) if internal else (a, delta)
+    wheel = turned((spread(1.0), spread(0.0)), delta)
+    phi, rise = load(work.phi), load(work.rise)
+    clear(block)
+    for c in range(n):
+        store(work.gain[c], 0.0)
+    z = start
+    for i in range(block.H_p):
+        # z(i+1) = A z(i) + B u(i) + affine, with A, B and affine at the current state; they vary only with kappa.
+        kappa = load(block.kappa[i])
+        if i == 0 or holds_in_any(~(kappa == load(block.kappa[i - 1]))):
+            z_next, heading_next, inner = implicit_step(start, heading, a, delta, wheel, kappa, dt, car, axles)
+            step = derivatives(start, heading, a, delta, wheel, kappa, dt, car, z_next, heading_next, inner)
+            affine = less(less(z_next, through_step(start, step)), _by_command(a, delta, step))
+        z_next = plus(affine, through_step(z, step))
+        columns = n if internal else 2 * min(i, block.H_c - 1) + 2
+        propagate(block, columns, step, not internal)
+        if internal:
+            z_next = plus(z_next, _by_command(felt_a + arm_a, felt_delta + arm_delta, step))
+            _add_arm(i, felt_a + arm_a, felt_delta + arm_delta, step, work)
+            arm_a, arm_delta = phi * arm_a - rise * felt_a, phi * arm_delta - rise * felt_delta
+            for c in range(n):
+                gain = phi * load(work.gain[c])
+                store(work.gain[c], gain + rise if c // 2 == min(i, block.H_c - 1) else gain)
+        y_error, v_error = z_next[Y] - load(block.y_target), z_next[V_X] - load(block.v_target)
+        add_tracking(block, y_error, v_error, z_next[R] - z[R], columns)
+        station = z_next[S]
+        for c in range(columns):
+            station = station + load(sens[c, S]) * (expected_a if c % 2 == 0 else expected_delta)
+            store(work.side[i, c], load(sens[c, Y]) * load(block.bounds[c % 2]))
+        for c in range(columns, n):
+            store(work.side[i, c], 0.0)
+        store(work.station, station)
+        for lane in range(WIDTH):
+            if block.entered[lane] > 0.0:
+                work.lower[i, lane], work.upper[i, lane] = lateral_bounds(
+                    scenes[block.index[lane]].area, work.station[lane]
+                )
+        store(work.lower[i], load(work.lower[i]) - z_next[Y])
+        store(work.upper[i], load(work.upper[i]) - z_next[Y])
+        z = z_next
+    store(work.room, load(work.end_of_area) - z[S])
+    for c in range(n):
+        store(work.end[c], load(sens[c, S]) * load(block.bounds[c % 2]))
+    if internal:
+        for c in range(n):
+            share = SHARE_OF_DESIRED * load(block.weights[EFFORT_A + c % 2])
+            store(block.hessian[c, c], load(block.hessian[c, c]) + share)
+    else:
+        for c in range(n):
+            store(block.U[c // 2, c % 2], 0.0)
+        add_effort(block, True)
+
+
 @jit_inlined
-def add_arm(i: int, command: tuple[float, float], p: Parameters, n: int, work: Workspace) -> None:
+def _by_command(a: Number, delta: Number, step: Derivatives) -> State:
+    """Change of the new state that a command makes."""
+    x, y = step.a, step.delta
+    return (
+        a * x[0] + delta * y[0],
+        a * x[1] + delta * y[1],
+        a * x[2] + delta * y[2],
+        a * x[3] + delta * y[3],
+        a * x[4] + delta * y[4],
+        a * x[5] + delta * y[5],
+    )
+
+
+@jit_inlined
+def _add_arm(i: int, a: Number, delta: Number, step: Derivatives, work: Drivers) -> None:
     """Add the effect and the effort of the command u(i) that drives the car at stage i, with the internal model.
 
     Args:
         i: index of the stage.
-        command: u(i) for u_h,des = 0, ``(a, delta)`` [m/s^2, rad].
-        p: parameters.
-        n: number of columns of the program, 2 H_c.
-        work: record of :data:`condensing.WORKSPACE`. ``gain`` holds du_h,act(i)/dU. The effect is added to the
-            sensitivities of the next state, the effort to the quadratic model.
+        a, delta: u(i) for u_h,des = 0 [m/s^2, rad].
+        step: derivatives of the step.
+        work: record of :data:`DRIVERS`. ``gain`` holds du_h,act(i)/dU. The effect is added to the sensitivities of the
+            next state, the effort to the quadratic model.
     """
-    B, sens, gain = work.B, work.sensitivity, work.gain
+    block = work.block
+    n = 2 * block.H_c
     for c in range(n):
+        by = step.a if c % 2 == 0 else step.delta
+        gain = load(work.gain[c])
         for j in range(6):
-            sens[j, c] += B[j, c % 2] * gain[c]
-        work.yaw_step[c] += B[R, c % 2] * gain[c]
-    if i < 1 or i > p.driver.H_c:
+            store(block.sensitivity[c, j], load(block.sensitivity[c, j]) + by[j] * gain)
+        store(block.yaw_step[c], load(block.yaw_step[c]) + by[R] * gain)
+    if i < 1 or i > block.H_c:
         return
     for channel in range(2):
-        for c in range(work.row.shape[0]):
-            work.row[c] = gain[c] if c % 2 == channel and c < n else 0.0
-        add_square(work, p.driver.Q_a if channel == 0 else p.driver.Q_delta, command[channel], n)
+        for c in range(n):
+            store(block.row[c], load(work.gain[c]) if c % 2 == channel else spread(0.0))
+        add_square(block, load(block.weights[EFFORT_A + channel]), a if channel == 0 else delta, n)
 
 
-@jit_inlined
-def build_program(
-    scene: Scene,
-    u_last: np.ndarray,
-    u_h_act: np.ndarray,
+@jit
+def program_of(
+    lane: int,
     p: Parameters,
-    work: Workspace,
+    work: Drivers,
     P: np.ndarray,
     q: np.ndarray,
     A: np.ndarray,
     low: np.ndarray,
     high: np.ndarray,
 ) -> None:
-    """Condense the driver's problem into dense matrices.
-
-    The paper's model is linearised about the driver's last desired command. The internal model is linearised about the
-    sum of the driver's present actual command and the automation's command as last felt.
+    """Write the program of one lane as dense matrices.
 
     Args:
-        scene: record of :data:`records.SCENE` with the safe area.
-        u_last: the driver's last desired command [m/s^2, rad], shape (2,).
-        u_h_act: the driver's present actual command u_h,act(k) [m/s^2, rad], shape (2,).
+        lane: index of the lane.
         p: parameters.
-        work: record of :data:`condensing.WORKSPACE`.
+        work: record of :data:`DRIVERS`, condensed.
         P: quadratic cost, symmetric, written, shape (n, n) with n = :func:`count_variables`.
         q: linear cost, written, shape (n,).
         A: constraint matrix, written, shape (:func:`count_rows`, n).
         low, high: bounds of the rows of A, written, one entry per row.
     """
-    w, dt = p.driver, p.task.dt
-    n = 2 * w.H_c
-    H_p = w.H_p
-    z, z_next = work.z, work.z_next
-    sens, affine = work.sensitivity, work.affine
-    clear(work, n)
-    for i in range(6):
-        z[i] = scene.z[i]
-    internal = p.internal_model.active
-    phi = exp(-dt / p.internal_model.T_h)
-    rise = p.internal_model.K_h * (1.0 - phi)
-    arm_a, arm_delta = u_h_act[0], u_h_act[1]
-    a, delta = u_last[0], u_last[1]
-    if internal:
-        a, delta = scene.felt[0] + arm_a, scene.felt[1] + arm_delta
-        for c in range(n):
-            work.gain[c] = 0.0
-    # A command that would stop the car within the step hides that the car can start to move. Linearise at rest instead.
-    a = max(a, -z[V_X] / dt - z[R] * z[V_Y])
-    heading, wheel = (cos(scene.z[PSI]), sin(scene.z[PSI])), (cos(delta), sin(delta))
-    rows = count_rows(p)
-    for i in range(rows):
-        for c in range(n + SLACKS):
-            A[i, c] = 0.0
+    block, H_p = work.block, p.driver.H_p
+    n = 2 * p.driver.H_c
     for i in range(H_p):
-        columns = 2 * min(i, w.H_c - 1) + 2
-        # z(i+1) = A z(i) + B u(i) + affine, with A, B and affine at the current state; they vary only with kappa.
-        if i == 0 or scene.kappa[i] != scene.kappa[i - 1]:
-            implicit_step_jacobian(
-                scene.z, heading, a, delta, wheel, scene.kappa[i], dt, p.model, affine, work.A, work.B
-            )
-            for j in range(6):
-                for m in range(6):
-                    affine[j] -= work.A[j, m] * scene.z[m]
-                affine[j] -= work.B[j, 0] * a + work.B[j, 1] * delta
-        for j in range(6):
-            z_next[j] = affine[j]
-            for m in range(6):
-                z_next[j] += work.A[j, m] * z[m]
-        if internal:
-            command = scene.felt[0] + arm_a, scene.felt[1] + arm_delta
-            for j in range(6):
-                z_next[j] += work.B[j, 0] * command[0] + work.B[j, 1] * command[1]
-            carry(work, n)
-            add_arm(i, command, p, n, work)
-            columns = n
-            arm_a = phi * arm_a - rise * scene.felt[0]
-            arm_delta = phi * arm_delta - rise * scene.felt[1]
-            for c in range(n):
-                work.gain[c] *= phi
-            for channel in range(2):
-                work.gain[2 * min(i, w.H_c - 1) + channel] += rise
-        else:
-            propagate(work, columns)
-        add_tracking(work, w, dt, z, z_next, scene.y_target, scene.v_target, columns)
-        # The rows of C are evaluated at the path length that the car reaches under the last command.
-        station = z_next[S]
-        for c in range(columns):
-            if internal:
-                station += sens[S, c] * u_last[c % 2]
-            else:
-                station += sens[S, c] * (a if c % 2 == 0 else delta)
-            bound = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
-            A[i, c] = sens[Y, c] * bound
-            A[H_p + i, c] = A[i, c]
-        lower, upper = lateral_bounds(scene.area, station)
+        for c in range(n):
+            A[i, c] = A[H_p + i, c] = work.side[i, c, lane]
         A[i, n], A[H_p + i, n] = -1.0, 1.0
-        low[i], high[i] = -UNBOUNDED, upper - z_next[Y]
-        low[H_p + i], high[H_p + i] = lower - z_next[Y], UNBOUNDED
-        z, z_next = z_next, z
+        A[i, n + 1] = A[H_p + i, n + 1] = 0.0
+        low[i], high[i] = -UNBOUNDED, work.upper[i, lane]
+        low[H_p + i], high[H_p + i] = work.lower[i, lane], UNBOUNDED
     first = 2 * H_p
     for c in range(n):
-        A[first, c] = sens[S, c] * (p.limits.a_max if c % 2 == 0 else p.limits.delta_max)
-    A[first, n + 1] = -1.0
-    low[first], high[first] = -UNBOUNDED, scene.area.end - 0.5 * p.model.length - z[S]
+        A[first, c] = work.end[c, lane]
+    A[first, n], A[first, n + 1] = 0.0, -1.0
+    low[first], high[first] = -UNBOUNDED, work.room[lane]
     first += 1
-    if internal:
-        for c in range(n):
-            work.hessian[c, c] += SHARE_OF_DESIRED * (w.Q_a if c % 2 == 0 else w.Q_delta)
-    else:
-        for j in range(w.H_c):
-            work.trial[j, 0] = work.trial[j, 1] = 0.0
-        add_effort(work, w, work.trial)
     for c in range(n + SLACKS):
-        A[first + c, c] = 1.0
+        for e in range(n + SLACKS):
+            A[first + c, e] = 1.0 if c == e else 0.0
         low[first + c], high[first + c] = (-1.0, 1.0) if c < n else (0.0, UNBOUNDED)
         for e in range(n, n + SLACKS):
             P[c, e] = P[e, c] = 0.0
     for c in range(n):
-        bound_c = p.limits.a_max if c % 2 == 0 else p.limits.delta_max
-        q[c] = 2.0 * work.gradient[c] * bound_c
-        for e in range(n):
-            bound_e = p.limits.a_max if e % 2 == 0 else p.limits.delta_max
-            P[c, e] = 2.0 * work.hessian[c, e] * bound_c * bound_e
+        bound_c = block.bounds[c % 2, lane]
+        q[c] = 2.0 * block.gradient[c, lane] * bound_c
+        for e in range(c + 1):
+            P[c, e] = P[e, c] = 2.0 * block.hessian[c, e, lane] * bound_c * block.bounds[e % 2, lane]
     for e in range(n, n + SLACKS):
         P[e, e], q[e] = 2.0 * SLACK_QUADRATIC, SLACK_LINEAR

@@ -8,7 +8,7 @@ response time. The error of the arm is proportional to its command. The numbers 
 
 from __future__ import annotations
 
-from math import cos, exp, sin
+from math import exp
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from shared_control_env.core.faults.noise import coloured, standard_normal
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import MAX_DELAY, PersonMemory, Scene
 from shared_control_env.core.world.scene import gap_ahead
-from shared_control_env.core.world.vehicle import PSI, V_X, Y, implicit_step
+from shared_control_env.core.world.vehicle import PSI, V_X, Y, step_in_place
 
 REASONS = ("nothing", "lane position", "heading", "headway", "felt steering", "felt acceleration", "display", "alert")
 """What a person may notice; the index of a reason is its code."""
@@ -116,8 +116,7 @@ def perceive_late(scene: Scene, u_last: np.ndarray, memory: PersonMemory, p: Par
         z[i] = memory.past[(k - late) % MAX_DELAY, i]
     for step in range(k - late, k):
         a, delta = memory.commands[step % MAX_DELAY, 0], memory.commands[step % MAX_DELAY, 1]
-        heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
-        implicit_step(z, heading, a, delta, wheel, scene.kappa[0], p.task.dt, p.model, z)
+        step_in_place(z, a, delta, scene.kappa[0], p.task.dt, p.model)
     z[Y] += p.person.weber * memory.error[LATERAL] * (z[Y] - scene.y_target)
     z[PSI] += p.person.weber * memory.error[DIRECTION] * z[PSI]
     z[V_X] = max(0.0, z[V_X] + p.person.weber * memory.error[SPEED] * (z[V_X] - scene.v_target))

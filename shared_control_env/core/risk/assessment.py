@@ -57,7 +57,7 @@ def predict_ego(
     xi = signals.prediction
     for i in range(6):
         xi[i] = state[i]
-    plant_step(xi, u_f[0], u_f[1], p.task.dt, p.model, work.plant)
+    plant_step(xi, u_f[0], u_f[1], p.task.dt, p.model)
     xi[0], xi[1], xi[2], xi[3], xi[4], xi[5] = ctra(
         state[0], state[1], state[2], state[V_X], transmitted(u_f[0], p.model), xi[R], tau
     )

@@ -11,6 +11,16 @@ from shared_control_env.core.risk.safe_area import boundary_distance, boundary_o
 
 
 @jit
+def cut_off(parameters: LateralRiskParameters) -> float:
+    """Distance from the boundaries beyond which the field is 0 [m]: ``d_c + v_w / 2``.
+
+    Args:
+        parameters: parameters of the field.
+    """
+    return parameters.d_c + 0.5 * parameters.v_w
+
+
+@jit
 def boundary_field(r_b: float, parameters: LateralRiskParameters) -> float:
     """Potential field of the boundaries, Eq. 2.
 
@@ -24,7 +34,7 @@ def boundary_field(r_b: float, parameters: LateralRiskParameters) -> float:
     Returns:
         Field value [-].
     """
-    if r_b > parameters.d_c + 0.5 * parameters.v_w:
+    if r_b > cut_off(parameters):
         return 0.0
     return parameters.alpha_f * exp(-((r_b / parameters.sigma_y) ** 2))
 
@@ -43,7 +53,7 @@ def continuous_field(
     Returns:
         Field value [-] and its derivatives with respect to s and d [1/m].
     """
-    cut = parameters.d_c + 0.5 * parameters.v_w
+    cut = cut_off(parameters)
     square, ds, dd = boundary_offset(area, s, d)
     if square > cut * cut:
         return 0.0, 0.0, 0.0

@@ -121,6 +121,28 @@ def boundary_distance(area: SafeArea, s: float, d: float) -> float:
 
 
 @jit
+def free_rectangle(area: SafeArea, distance: float) -> tuple[float, float, float, float]:
+    """A rectangle in C whose points are farther than a distance from both boundaries, found from their extremes alone.
+
+    Args:
+        area: record of :data:`records.SAFE_AREA`.
+        distance: the distance [m].
+
+    Returns:
+        ``start, end, low, high`` in the road frame [m]. Beyond an open end of C the boundaries are extended, as in
+        :func:`boundary_offset`, so that start is -inf or end is inf there.
+    """
+    low, high = -np.inf, np.inf
+    for k in range(MAX_CHAIN):
+        low, high = max(low, area.lower[k, 1]), min(high, area.upper[k, 1])
+    first, last = area.upper[0, 0], area.upper[MAX_CHAIN - 1, 0]
+    start = -np.inf if first <= area.start else first
+    end = np.inf if area.outcome == REACHED and last > area.end - ON_LINE else last
+    margin = distance + ON_LINE
+    return start, end, low + margin, high - margin
+
+
+@jit
 def lateral_bounds(area: SafeArea, s: float) -> tuple[float, float]:
     """Lateral extent of C at path length s, from the highest lower boundary to the lowest upper boundary.
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numba import from_dtype, types
 
-from shared_control_env.core.compile.calls import MATRIX, VECTOR, Interface
+from shared_control_env.core.compile.calls import MATRIX, VECTOR, Interface, array_of
 from shared_control_env.core.parameters import Parameters, TrafficParameters
 from shared_control_env.core.records import (
     BODY_LENGTH,
@@ -19,7 +18,6 @@ from shared_control_env.core.records import (
     Transition,
     X,
     Y,
-    record_dtype,
 )
 from shared_control_env.core.world.actuator import actuate
 from shared_control_env.core.world.collision import overlap
@@ -32,12 +30,10 @@ class Motion:
 
     Attributes:
         row: the ego as a row of the traffic array.
-        plant: scratch of the vehicle's simulation step.
         trial: scratch of replayed vehicles that look ahead.
     """
 
     row: Annotated[np.ndarray, (8,)]
-    plant: Annotated[np.ndarray, (2, 6)]
     trial: Annotated[np.ndarray, (3, 8)]
 
 
@@ -79,7 +75,7 @@ def move(
         for j in range(traffic.shape[0]):
             decide(j, plans, traffic, row, step, dt, line, work.trial)
         actuate(signals.u, dt, p.actuator, realised)
-        plant_step(state, realised[0], realised[1], dt, p.vehicle, work.plant)
+        plant_step(state, realised[0], realised[1], dt, p.vehicle)
         row[X], row[Y], row[HEADING] = state[0], state[1], state[2]
         for j in range(traffic.shape[0]):
             advance(j, plans, traffic, row, step, dt, line)
@@ -88,7 +84,7 @@ def move(
                 transition.crashed = True
 
 
-_PLANS = types.Array(from_dtype(record_dtype(TrafficParameters)), 1, "C")
+_PLANS = array_of(TrafficParameters)
 
 MOVE = Interface(None, int, int, float, Signals, Parameters, VECTOR, MATRIX, _PLANS, MATRIX, Memory, Transition, Motion)
 """``move(k, frames, dt, signals, p, state, traffic, plans, line, memory, transition, work)``, compiled by itself."""

@@ -13,11 +13,12 @@ is then held at 0. Such episodes nearly always end off the road.
 from __future__ import annotations
 
 from math import cos, sin, sqrt
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from shared_control_env.core.compile.jit import jit, jit_allocating, jit_inlined
+from shared_control_env.core.compile.lanes import Number, choose
 from shared_control_env.core.parameters import VehicleParameters
 from shared_control_env.core.world.tyre import FORCE
 
@@ -48,14 +49,60 @@ An anti-lock brake leaves the tyres a lateral force: sqrt(1 - 0.9^2) = 0.44 of t
 
 _force = FORCE.call
 
-Direction: TypeAlias = tuple[float, float]
+State: TypeAlias = tuple[Number, Number, Number, Number, Number, Number]
+"""A state z, or a change of one."""
+
+Direction: TypeAlias = tuple[Number, Number]
 """Cosine and sine of an angle."""
 
-Axles: TypeAlias = tuple[float, float, float]
+Inner: TypeAlias = tuple[Number, Number, Number, Number, Number]
+"""What a step has computed on its way, see :func:`implicit_step`."""
+
+Axles: TypeAlias = tuple[Number, Number, Number]
 """Stiffness K of the front and the rear axle [N/rad], and the smallest speed v_s in a slip [m/s].
 
 An axle's lateral force is ``-K slip``; the slip is its lateral velocity divided by ``max(v_x, v_s)``.
 """
+
+
+class Dynamics(NamedTuple):
+    """The parameters of a vehicle that :func:`implicit_step` reads, as lanes; :class:`VehicleParameters` has them too.
+
+    Attributes:
+        m: mass [kg].
+        I_z: yaw inertia [kg m^2].
+        l_f, l_r: distances from the centre of gravity to the front and to the rear axle [m].
+        C_f, C_r: cornering stiffness of one front and of one rear tyre [N/rad].
+    """
+
+    m: Number
+    I_z: Number
+    l_f: Number
+    l_r: Number
+    C_f: Number
+    C_r: Number
+
+
+Car: TypeAlias = Dynamics | VehicleParameters
+"""Parameters of one vehicle, or of those of a block."""
+
+
+class Derivatives(NamedTuple):
+    """Derivatives of a step: changes of the new state, each for a unit of one quantity. That of s is one of s alone.
+
+    Attributes:
+        y, psi: for the state's y and psi; the new s, y and psi alone, since the velocities do not depend on them.
+        v_x, v_y, r: for the state's velocities.
+        a, delta: for the command.
+    """
+
+    y: tuple[Number, Number, Number]
+    psi: tuple[Number, Number, Number]
+    v_x: State
+    v_y: State
+    r: State
+    a: State
+    delta: State
 
 
 @jit_allocating
@@ -96,18 +143,18 @@ def derivative(z: np.ndarray, a: float, delta: float, kappa: float, vehicle: Veh
     return dz
 
 
-@jit
+@jit_inlined
 def implicit_step(
-    z: np.ndarray,
+    z: State,
     heading: Direction,
-    a: float,
-    delta: float,
+    a: Number,
+    delta: Number,
     wheel: Direction,
-    kappa: float,
+    kappa: Number,
     h: float,
-    vehicle: VehicleParameters,
-    z_next: np.ndarray,
-) -> Direction:
+    vehicle: Car,
+    axles: Axles,
+) -> tuple[State, Direction, Inner]:
     """One step of length h that is implicit in the lateral motion: the discrete model f^d of Eq. 12.
 
     One explicit step of 0.05 s is unstable below about 15 m/s, since the yaw damping grows as 1/v_x. Moreover, the slip
@@ -126,47 +173,84 @@ def implicit_step(
         y+    = y + h (v sin(psi+) + v_y+ cos(psi+))
 
     with the stiffness ``K = 2 C`` of an axle and ``c = cos(delta)``. The step is of first order in h. Sines and cosines
-    are passed on from step to step, since they cost as much as the rest of the step.
+    are passed on from step to step, see :func:`turned`. Numbers may be floats, or lanes of eight environments.
 
     Args:
-        z: state, shape (6,).
+        z: state.
         heading: cosine and sine of psi.
         a: acceleration [m/s^2].
         delta: front steering angle [rad].
         wheel: cosine and sine of delta.
         kappa: curvature of the path [1/m].
         h: step [s].
-        vehicle: parameters of the vehicle; its tyres count as linear.
-        z_next: new state, written, shape (6,); may be ``z`` itself.
+        vehicle: parameters of the vehicle; those of its tyres are in ``axles``.
+        axles: see :data:`Axles`; the controllers' are linear.
 
     Returns:
-        Cosine and sine of the new psi.
+        New state; cosine and sine of the new psi; s' and the entries of M^-1, row by row, where ``M [v_y+, r+] = b``.
     """
-    return _implicit_step(z, heading, a, delta, wheel, kappa, h, vehicle, linear_axles(vehicle), z_next)
+    s, y, psi, v_x, v_y, r = z
+    v = v_x + h * (a + r * v_y)
+    v = choose(v < 0.0, 0.0, v)
+    l_f, l_r = vehicle.l_f, vehicle.l_r
+    K_f, K_r, slowest = axles
+    v_s = choose(v < slowest, slowest, v)
+    K_fc, h_m, h_I = K_f * wheel[0], h / vehicle.m, h / vehicle.I_z
+    m11 = v_s + h_m * (K_fc + K_r)
+    m12 = h * v * v_s + h_m * (K_fc * l_f - K_r * l_r)
+    m21 = h_I * (l_f * K_f - l_r * K_r)
+    m22 = v_s + h_I * (l_f * l_f * K_f + l_r * l_r * K_r)
+    b1 = v_s * v_y + h_m * K_fc * delta * v
+    b2 = v_s * r + h_I * l_f * K_f * delta * v
+    scale = 1.0 / (m11 * m22 - m12 * m21)
+    i11, i12, i21, i22 = m22 * scale, -m12 * scale, -m21 * scale, m11 * scale
+    v_y1, r1 = i11 * b1 + i12 * b2, i21 * b1 + i22 * b2
+    s_rate = (v * heading[0] - v_y1 * heading[1]) / (1.0 - kappa * y)
+    turn = h * (r1 - kappa * s_rate)
+    heading1 = turned(heading, turn)
+    y1 = y + h * (v * heading1[1] + v_y1 * heading1[0])
+    return (s + h * s_rate, y1, psi + turn, v, v_y1, r1), heading1, (s_rate, i11, i12, i21, i22)
 
 
 @jit_inlined
-def _implicit_step(
-    z: np.ndarray,
-    heading: Direction,
-    a: float,
-    delta: float,
-    wheel: Direction,
-    kappa: float,
-    h: float,
-    vehicle: VehicleParameters,
-    axles: Axles,
-    z_next: np.ndarray,
-) -> Direction:
-    """:func:`implicit_step` with a given stiffness of the axles."""
-    (v, v_y, r), _ = _step_velocities(z, a, delta, wheel, h, vehicle, axles)
-    heading, _ = _step_pose(z, heading, v, v_y, r, kappa, h, z_next)
-    z_next[V_X], z_next[V_Y], z_next[R] = v, v_y, r
-    return heading
+def turned(heading: Direction, angle: Number) -> Direction:
+    """Cosine and sine after a turn by a small angle, by the series of both, which needs no call of a library.
+
+    Args:
+        heading: cosine and sine before.
+        angle: the turn [rad]. Exact in double precision up to 0.5 rad in a step, to 1e-11 up to 1 rad.
+
+    Returns:
+        Cosine and sine.
+    """
+    q = angle * angle
+    c = 1.0 - q * (1 / 2 - q * (1 / 24 - q * (1 / 720 - q * (1 / 40320 - q * (1 / 3628800 - q * (1 / 479001600))))))
+    s = 1 / 362880 - q * (1 / 39916800 - q * (1 / 6227020800))
+    s = angle * (1.0 - q * (1 / 6 - q * (1 / 120 - q * (1 / 5040 - q * s))))
+    return heading[0] * c - heading[1] * s, heading[1] * c + heading[0] * s
+
+
+@jit
+def step_in_place(z: np.ndarray, a: float, delta: float, kappa: float, h: float, vehicle: VehicleParameters) -> None:
+    """Advance an array by :func:`implicit_step` with linear tyres.
+
+    Args:
+        z: state, overwritten, shape (6,).
+        a: acceleration [m/s^2].
+        delta: front steering angle [rad].
+        kappa: curvature of the path [1/m].
+        h: step [s].
+        vehicle: parameters of the vehicle.
+    """
+    heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
+    axles = linear_axles(vehicle)
+    z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R] = implicit_step(
+        (z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R]), heading, a, delta, wheel, kappa, h, vehicle, axles
+    )[0]
 
 
 @jit_inlined
-def linear_axles(vehicle: VehicleParameters) -> Axles:
+def linear_axles(vehicle: Car) -> Axles:
     """Both axles with the linear tyres of Eq. 11: ``K = 2 C``.
 
     Args:
@@ -190,7 +274,7 @@ def transmitted(a: float, vehicle: VehicleParameters) -> float:
 
 
 @jit_inlined
-def axles_at(z: np.ndarray, a: float, delta: float, vehicle: VehicleParameters) -> Axles:
+def axles_at(z: State, a: float, delta: float, vehicle: VehicleParameters) -> Axles:
     """Both axles at a state: their stiffness is the secant of the tyres' forces at the present slip.
 
     Readings: tangent or secant. The tangent is 0 where a tyre slides, and the implicit step is then singular at
@@ -201,7 +285,7 @@ def axles_at(z: np.ndarray, a: float, delta: float, vehicle: VehicleParameters) 
     lateral force.
 
     Args:
-        z: state, shape (6,).
+        z: state.
         a: transmitted acceleration [m/s^2].
         delta: front steering angle [rad].
         vehicle: parameters of the vehicle.
@@ -226,164 +310,129 @@ def _secant(tyre: int, slip: float, C: float, mu: float, F_z: float) -> float:
 
 
 @jit_inlined
-def _step_velocities(
-    z: np.ndarray, a: float, delta: float, wheel: Direction, h: float, vehicle: VehicleParameters, axles: Axles
-) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-    """New speed, lateral velocity and yaw rate of :func:`implicit_step`, which solve ``M [v_y+, r+] = b``.
-
-    Returns:
-        ``(v, v_y+, r+)`` and the entries of M^-1, row by row.
-    """
-    v_y, r = z[V_Y], z[R]
-    v = max(0.0, z[V_X] + h * (a + r * v_y))
-    l_f, l_r = vehicle.l_f, vehicle.l_r
-    K_f, K_r, slowest = axles
-    v_s = max(v, slowest)
-    K_fc, h_m, h_I = K_f * wheel[0], h / vehicle.m, h / vehicle.I_z
-    m11 = v_s + h_m * (K_fc + K_r)
-    m12 = h * v * v_s + h_m * (K_fc * l_f - K_r * l_r)
-    m21 = h_I * (l_f * K_f - l_r * K_r)
-    m22 = v_s + h_I * (l_f * l_f * K_f + l_r * l_r * K_r)
-    b1 = v_s * v_y + h_m * K_fc * delta * v
-    b2 = v_s * r + h_I * l_f * K_f * delta * v
-    scale = 1.0 / (m11 * m22 - m12 * m21)
-    i11, i12, i21, i22 = m22 * scale, -m12 * scale, -m21 * scale, m11 * scale
-    return (v, i11 * b1 + i12 * b2, i21 * b1 + i22 * b2), (i11, i12, i21, i22)
-
-
-@jit_inlined
-def _step_pose(
-    z: np.ndarray, heading: Direction, v: float, v_y: float, r: float, kappa: float, h: float, z_next: np.ndarray
-) -> tuple[Direction, float]:
-    """Write the new pose of :func:`implicit_step` under the new velocities.
-
-    Returns:
-        Cosine and sine of the new psi, and s'.
-    """
-    s, y, psi = z[S], z[Y], z[PSI]
-    s_rate = (v * heading[0] - v_y * heading[1]) / (1.0 - kappa * y)
-    psi += h * (r - kappa * s_rate)
-    heading = cos(psi), sin(psi)
-    z_next[S] = s + h * s_rate
-    z_next[Y] = y + h * (v * heading[1] + v_y * heading[0])
-    z_next[PSI] = psi
-    return heading, s_rate
-
-
-@jit_inlined
-def implicit_step_jacobian(
-    z: np.ndarray,
+def derivatives(
+    z: State,
     heading: Direction,
-    a: float,
-    delta: float,
+    a: Number,
+    delta: Number,
     wheel: Direction,
-    kappa: float,
+    kappa: Number,
     h: float,
-    vehicle: VehicleParameters,
-    z_next: np.ndarray,
-    A: np.ndarray,
-    B: np.ndarray,
-) -> Direction:
-    """:func:`implicit_step` with its derivatives ``A = dz+/dz`` and ``B = dz+/d[a, delta]``.
+    vehicle: Car,
+    z_next: State,
+    heading_next: Direction,
+    inner: Inner,
+) -> Derivatives:
+    """Derivatives of :func:`implicit_step` on linear tyres with respect to the state and to the command.
 
     The pair ``x = [v_y+, r+]`` solves ``M x = b``, so its derivative solves ``M dx = db - dM x``. Where braking holds
-    the speed at zero, the derivatives of the speed vanish. The tyres are linear, as in the controllers' model.
+    the speed at zero, the derivatives of the speed vanish.
 
     Args:
-        z, heading, a, delta, wheel, kappa, h, vehicle, z_next: as in :func:`implicit_step`.
-        A: derivative of the new state with respect to the state, written, shape (6, 6).
-        B: derivative of the new state with respect to the command, written, shape (6, 2).
-
-    Returns:
-        Cosine and sine of the new psi.
+        z, heading, a, delta, wheel, kappa, h, vehicle: as in :func:`implicit_step`.
+        z_next, heading_next, inner: what it returned.
     """
-    y, v_x, v_y, r = z[Y], z[V_X], z[V_Y], z[R]
-    (v, v_y1, r1), (i11, i12, i21, i22) = _step_velocities(z, a, delta, wheel, h, vehicle, linear_axles(vehicle))
-    heading1, s_rate = _step_pose(z, heading, v, v_y1, r1, kappa, h, z_next)
-    z_next[V_X], z_next[V_Y], z_next[R] = v, v_y1, r1
+    _, y, _, v_x, v_y, r = z
+    _, _, _, v, v_y1, r1 = z_next
+    s_rate, i11, i12, i21, i22 = inner
     # At rest the derivative is that for a car that starts to move; otherwise a controller would never start the car.
-    moving = 1.0 if v_x + h * (a + r * v_y) >= 0.0 else 0.0
+    moving = choose(v_x + h * (a + r * v_y) >= 0.0, 1.0, 0.0)
     K_f, c, sn, h_m, h_I = 2.0 * vehicle.C_f, wheel[0], wheel[1], h / vehicle.m, h / vehicle.I_z
 
     # Derivatives of (v_y+, r+) with respect to the new speed v, then v_y, r and delta.
     e1 = v_y + h_m * K_f * c * delta - v_y1 - 2.0 * h * v * r1
     e2 = r + h_I * vehicle.l_f * K_f * delta - r1
     V_v, R_v = i11 * e1 + i12 * e2, i21 * e1 + i22 * e2
-    V_vy, R_vy = i11 * v, i21 * v
-    V_r, R_r = i12 * v, i22 * v
     e1 = h_m * K_f * (v * (c - delta * sn) + sn * (v_y1 + vehicle.l_f * r1))
     e2 = h_I * vehicle.l_f * K_f * v
     V_d, R_d = i11 * e1 + i12 * e2, i21 * e1 + i22 * e2
-
-    for i in range(6):
-        for j in range(6):
-            A[i, j] = 0.0
-        B[i, 0] = B[i, 1] = 0.0
     v_vx, v_vy, v_r, v_a = moving, moving * h * r, moving * h * v_y, moving * h
-    A[V_X, V_X], A[V_X, V_Y], A[V_X, R], B[V_X, 0] = v_vx, v_vy, v_r, v_a
-    A[V_Y, V_X], A[V_Y, V_Y], A[V_Y, R] = V_v * v_vx, V_vy + V_v * v_vy, V_r + V_v * v_r
-    A[R, V_X], A[R, V_Y], A[R, R] = R_v * v_vx, R_vy + R_v * v_vy, R_r + R_v * v_r
-    B[V_Y, 0], B[V_Y, 1], B[R, 0], B[R, 1] = V_v * v_a, V_d, R_v * v_a, R_d
+    by_v_x = v_vx, V_v * v_vx, R_v * v_vx
+    by_v_y = v_vy, i11 * v + V_v * v_vy, i21 * v + R_v * v_vy
+    by_r = v_r, i12 * v + V_v * v_r, i22 * v + R_v * v_r
+    by_a = v_a, V_v * v_a, R_v * v_a
+    by_delta = 0.0 * v, V_d, R_d
 
     # s', psi+ and y+ by the chain rule through v, v_y+ and r+.
     stretch = 1.0 / (1.0 - kappa * y)
-    cp, sp = heading
-    cp1, sp1 = heading1
-    s_rate_y = kappa * s_rate * stretch
-    s_rate_psi = -(v * sp + v_y1 * cp) * stretch
-    y_psi1 = v * cp1 - v_y1 * sp1
-    A[S, S], A[Y, Y], A[PSI, PSI] = 1.0, 1.0, 1.0
-    A[S, Y], A[S, PSI] = h * s_rate_y, h * s_rate_psi
-    A[PSI, Y], A[PSI, PSI] = -h * kappa * s_rate_y, 1.0 - h * kappa * s_rate_psi
-    A[Y, Y] += h * y_psi1 * A[PSI, Y]
-    A[Y, PSI] = h * y_psi1 * A[PSI, PSI]
-    for j in (V_X, V_Y, R):
-        ds = (A[V_X, j] * cp - A[V_Y, j] * sp) * stretch
-        A[S, j] = h * ds
-        A[PSI, j] = h * (A[R, j] - kappa * ds)
-        A[Y, j] = h * (A[V_X, j] * sp1 + A[V_Y, j] * cp1 + y_psi1 * A[PSI, j])
-    for j in range(2):
-        ds = (B[V_X, j] * cp - B[V_Y, j] * sp) * stretch
-        B[S, j] = h * ds
-        B[PSI, j] = h * (B[R, j] - kappa * ds)
-        B[Y, j] = h * (B[V_X, j] * sp1 + B[V_Y, j] * cp1 + y_psi1 * B[PSI, j])
-    return heading1
+    y_psi = v * heading_next[0] - v_y1 * heading_next[1]
+    by_y = h * (kappa * s_rate * stretch)
+    by_psi = h * (-(v * heading[1] + v_y1 * heading[0]) * stretch)
+    turn_y, turn_psi = -kappa * by_y, 1.0 - kappa * by_psi
+    return Derivatives(
+        (by_y, 1.0 + h * y_psi * turn_y, turn_y),
+        (by_psi, h * y_psi * turn_psi, turn_psi),
+        _through(by_v_x, heading, heading_next, kappa, h, stretch, y_psi),
+        _through(by_v_y, heading, heading_next, kappa, h, stretch, y_psi),
+        _through(by_r, heading, heading_next, kappa, h, stretch, y_psi),
+        _through(by_a, heading, heading_next, kappa, h, stretch, y_psi),
+        _through(by_delta, heading, heading_next, kappa, h, stretch, y_psi),
+    )
 
 
-@jit
-def tyre_step(
-    z: np.ndarray,
+@jit_inlined
+def _through(
+    velocities: tuple[Number, Number, Number],
     heading: Direction,
-    a: float,
-    delta: float,
-    wheel: Direction,
+    heading_next: Direction,
+    kappa: Number,
     h: float,
-    vehicle: VehicleParameters,
-    z_next: np.ndarray,
-) -> Direction:
-    """:func:`implicit_step` in the Cartesian frame, on the tyres that the vehicle has.
+    stretch: Number,
+    y_psi: Number,
+) -> State:
+    """Derivative of the new state with respect to what changes the new velocities (v, v_y+, r+) as given."""
+    v, v_y, r = velocities
+    s = h * ((v * heading[0] - v_y * heading[1]) * stretch)
+    psi = h * r - kappa * s
+    y = h * (v * heading_next[1] + v_y * heading_next[0] + y_psi * psi)
+    return s, y, psi, v, v_y, r
+
+
+@jit_inlined
+def plus(x: State, y: State) -> State:
+    """Sum of two states or changes of one.
 
     Args:
-        z: state, shape (6,).
-        heading: cosine and sine of psi.
-        a: transmitted acceleration [m/s^2].
-        delta: front steering angle [rad].
-        wheel: cosine and sine of delta.
-        h: step [s].
-        vehicle: parameters.
-        z_next: the new state is written here, shape (6,); may be ``z`` itself.
-
-    Returns:
-        Cosine and sine of the new psi.
+        x, y: the terms.
     """
-    return _implicit_step(z, heading, a, delta, wheel, 0.0, h, vehicle, axles_at(z, a, delta, vehicle), z_next)
+    return x[0] + y[0], x[1] + y[1], x[2] + y[2], x[3] + y[3], x[4] + y[4], x[5] + y[5]
+
+
+@jit_inlined
+def less(x: State, y: State) -> State:
+    """Difference of two states or changes of one.
+
+    Args:
+        x: minuend.
+        y: subtrahend.
+    """
+    return x[0] - y[0], x[1] - y[1], x[2] - y[2], x[3] - y[3], x[4] - y[4], x[5] - y[5]
+
+
+@jit_inlined
+def through_step(x: State, d: Derivatives) -> State:
+    """Derivative of the new state with respect to what changes the state as given: the matrix A of a step times x.
+
+    Only s depends on s, and the velocities depend only on velocities.
+
+    Args:
+        x: change of the state.
+        d: derivatives of the step.
+    """
+    s, y, psi, v_x, v_y, r = x
+    return (
+        s + d.y[S] * y + d.psi[S] * psi + d.v_x[S] * v_x + d.v_y[S] * v_y + d.r[S] * r,
+        d.y[Y] * y + d.psi[Y] * psi + d.v_x[Y] * v_x + d.v_y[Y] * v_y + d.r[Y] * r,
+        d.y[PSI] * y + d.psi[PSI] * psi + d.v_x[PSI] * v_x + d.v_y[PSI] * v_y + d.r[PSI] * r,
+        d.v_x[V_X] * v_x + d.v_y[V_X] * v_y + d.r[V_X] * r,
+        d.v_x[V_Y] * v_x + d.v_y[V_Y] * v_y + d.r[V_Y] * r,
+        d.v_x[R] * v_x + d.v_y[R] * v_y + d.r[R] * r,
+    )
 
 
 @jit
-def extrapolated_step(
-    z: np.ndarray, a: float, delta: float, h: float, vehicle: VehicleParameters, work: np.ndarray
-) -> None:
-    """Advance the state in place by h in the Cartesian frame, with second order in h.
+def extrapolated_step(z: np.ndarray, a: float, delta: float, h: float, vehicle: VehicleParameters) -> None:
+    """Advance the state in place by h in the Cartesian frame, with second order in h, on the tyres that the car has.
 
     This is the Richardson extrapolation of the implicit step, ``z(h) = 2 f(h/2, f(h/2, z)) - f(h, z)``. It keeps the
     implicit step's damping of the stiff lateral motion at any step size (Hairer & Wanner, Solving ODEs II, Section
@@ -391,23 +440,24 @@ def extrapolated_step(
 
     Args:
         z: state ``[x, y, psi, v_x, v_y, r]``, overwritten, shape (6,).
-        a, delta: command [m/s^2, rad].
+        a, delta: transmitted acceleration [m/s^2] and steering angle [rad].
         h: step [s].
         vehicle: parameters of the vehicle.
-        work: scratch, shape (2, 6).
     """
-    coarse, fine = work[0], work[1]
+    start = z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R]
     heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
-    tyre_step(z, heading, a, delta, wheel, h, vehicle, coarse)
-    heading = tyre_step(z, heading, a, delta, wheel, 0.5 * h, vehicle, fine)
-    tyre_step(fine, heading, a, delta, wheel, 0.5 * h, vehicle, fine)
+    axles = axles_at(start, a, delta, vehicle)
+    coarse = implicit_step(start, heading, a, delta, wheel, 0.0, h, vehicle, axles)[0]
+    half, heading, _ = implicit_step(start, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles)
+    axles = axles_at(half, a, delta, vehicle)
+    fine = implicit_step(half, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles)[0]
     for i in range(6):
         z[i] = 2.0 * fine[i] - coarse[i]
     z[V_X] = max(0.0, z[V_X])
 
 
 @jit
-def plant_step(z: np.ndarray, a: float, delta: float, dt: float, vehicle: VehicleParameters, work: np.ndarray) -> None:
+def plant_step(z: np.ndarray, a: float, delta: float, dt: float, vehicle: VehicleParameters) -> None:
     """Advance the plant in place by dt: :data:`PLANT_SUBSTEPS` extrapolated steps with a constant command.
 
     Args:
@@ -415,8 +465,7 @@ def plant_step(z: np.ndarray, a: float, delta: float, dt: float, vehicle: Vehicl
         a, delta: command [m/s^2, rad], held over the step.
         dt: step [s].
         vehicle: parameters of the vehicle.
-        work: scratch, shape (2, 6).
     """
     a = transmitted(a, vehicle)
     for _ in range(PLANT_SUBSTEPS):
-        extrapolated_step(z, a, delta, dt / PLANT_SUBSTEPS, vehicle, work)
+        extrapolated_step(z, a, delta, dt / PLANT_SUBSTEPS, vehicle)

@@ -119,7 +119,6 @@ class EgoVehicle(ArrayVehicle):
         self.target_speed = target_speed
         self.color = VehicleGraphics.EGO_COLOR
         self.realised, self._command = np.zeros(2), np.zeros(2)
-        self._work = np.zeros((2, 6))
 
     @property
     def velocity(self) -> np.ndarray:
@@ -135,7 +134,7 @@ class EgoVehicle(ArrayVehicle):
         """
         u = self._command
         u[0], u[1] = self.action["acceleration"], self.action["steering"]
-        entries.step_plant(self.array, u, self.realised, dt, self.parameters, self._work)
+        entries.step_plant(self.array, u, self.realised, dt, self.parameters)
 
 
 class LaneFollower(ArrayVehicle):

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from benchmarks.controllers import automation_cost, solve_automation
+from benchmarks.controllers import automation_cost, linearise, pose, solve_automation
 from shared_control_env.core.control import automation
-from shared_control_env.core.control.condensing import WORKSPACE
+from shared_control_env.core.control.automation import AUTOMATIONS
 from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import MAX_CONTROL, pack
 from shared_control_env.core.world.road import reference_line
@@ -29,11 +29,11 @@ def scenes(count=N_STATES, line=STRAIGHT):
 
 def solve(scene, iterations, U=None):
     U = np.zeros((MAX_CONTROL, 2)) if U is None else U
-    return U, solve_automation(U, scene, PARAMETERS, iterations, np.zeros((), WORKSPACE))
+    return U, solve_automation(U, scene, PARAMETERS, iterations, np.zeros((), AUTOMATIONS))
 
 
 def slsqp(scene, start):
-    work, U = np.zeros((), WORKSPACE), np.zeros((MAX_CONTROL, 2))
+    work, U = np.zeros((), AUTOMATIONS), np.zeros((MAX_CONTROL, 2))
 
     def cost(x):
         U[:3] = x.reshape(3, 2) * SCALE
@@ -114,12 +114,13 @@ def test_agrees_with_casadi_and_ipopt():
 @pytest.mark.parametrize("line", [STRAIGHT, reference_line([(300.0, 1 / 60)], lead_in=50.0)])
 def test_gradient_matches_finite_differences(line):
     rng = np.random.default_rng(1)
-    work = np.zeros((), WORKSPACE)
+    work = np.zeros((), AUTOMATIONS)
     for scene in scenes(20, line):
         U = np.zeros((MAX_CONTROL, 2))
         U[:3] = rng.uniform(-0.3, 0.3, (3, 2)) * SCALE
-        automation.linearise(U, scene[()], PARAMETERS[()], work[()])
-        gradient = 2.0 * work["gradient"][:6].copy()
+        pose(U, scene.reshape(1), PARAMETERS.reshape(1), 0, work)
+        linearise(True, scene.reshape(1), PARAMETERS.reshape(1), work)
+        gradient = 2.0 * work["block"]["gradient"][:6, 0].copy()
         numeric = []
         for c in range(6):
             step = np.zeros((MAX_CONTROL, 2))

@@ -5,11 +5,10 @@ import pytest
 
 from shared_control_env.controllers.driver import PredictiveDriver
 from shared_control_env.core import entries
-from shared_control_env.core.control import condensing
-from shared_control_env.core.control.driver import SHARE_OF_DESIRED, SLACK_LINEAR, SLACK_QUADRATIC, SLACKS
+from shared_control_env.core.control.driver import DRIVERS, SHARE_OF_DESIRED, SLACK_LINEAR, SLACK_QUADRATIC, SLACKS
 from shared_control_env.core.parameters import InternalModelParameters, Parameters
 from shared_control_env.core.records import pack
-from shared_control_env.core.world.vehicle import implicit_step_jacobian
+from tests.compiled import step_with_derivatives
 from tests.scenes import random_state, scene_of, traffic
 
 BOUNDS = np.array([5.0, np.pi / 6])
@@ -20,18 +19,16 @@ def build(parameters, scene, u_last, u_h_act):
     n, rows = 2 * w.H_c + SLACKS, 2 * w.H_p + 1
     P, q, A = np.zeros((n, n)), np.zeros(n), np.zeros((rows + n, n))
     low, high = np.zeros(rows + n), np.zeros(rows + n)
-    work = np.zeros((), condensing.WORKSPACE)
-    entries.build_program(scene, u_last, u_h_act, pack(parameters), work, P, q, A, low, high)
+    work = np.zeros((), DRIVERS)
+    entries.build_program(scene.reshape(1), u_last, u_h_act, pack(parameters), work, P, q, A, low, high)
     return P, q, A, low, high
 
 
 def linear_model(parameters, scene, u):
     """``z+ = A z + B u + affine`` at the scene's state and a command, at every stage."""
     z, stages = scene["z"], []
-    heading, wheel = (np.cos(z[2]), np.sin(z[2])), (np.cos(u[1]), np.sin(u[1]))
     for i in range(parameters.driver.H_p):
-        A, B, f = np.zeros((6, 6)), np.zeros((6, 2)), np.zeros(6)
-        implicit_step_jacobian(z, heading, u[0], u[1], wheel, scene["kappa"][i], 0.05, parameters.vehicle, f, A, B)
+        f, A, B = step_with_derivatives(z, u[0], u[1], scene["kappa"][i], 0.05, parameters.vehicle)
         stages.append((A, B, f - A @ z - B @ u))
     return stages
 

@@ -39,7 +39,7 @@ def test_the_predicted_yaw_rate_is_that_of_the_plant_under_the_same_command(tyre
         signals["u_a_des"] = u
         compiled.monitor(scene, traffic(), STRAIGHT, *NO_FAULTS, parameters, signals)
         state = scene["state"].copy()
-        plant_step(state, u[0], u[1], 0.05, car, np.zeros((2, 6)))
+        plant_step(state, u[0], u[1], 0.05, car)
         assert signals["prediction"][5] == pytest.approx(state[5], abs=1e-9)
 
 

@@ -75,9 +75,9 @@ def exact(z, a, delta, duration):
 
 
 def drive(z, a, delta, duration, h, step=dynamics.plant_step, car=CAR):
-    z, work = np.array(z, dtype=float), np.zeros((2, 6))
+    z = np.array(z, dtype=float)
     for _ in range(round(duration / h)):
-        step(z, a, delta, h, car, work)
+        step(z, a, delta, h, car)
     return z
 
 
@@ -109,14 +109,14 @@ def test_no_command_accelerates_the_car_more_than_the_road_allows(mu):
 
     The force per mass, averaged over a step of the environment, stays within mu g, and comes near it.
     """
-    car, rng, work, largest = CAR._replace(mu=mu), np.random.default_rng(0), np.zeros((2, 6)), 0.0
+    car, rng, largest = CAR._replace(mu=mu), np.random.default_rng(0), 0.0
     for _ in range(200):
         z = np.array([0.0, 0.0, 0.0, rng.uniform(5.0, 35.0), 0.0, 0.0])
         for k in range(40):
             if k % 10 == 0:
                 a, delta = rng.uniform(-5.0, 5.0), rng.choice([-0.5, 0.5])
             before = z.copy()
-            dynamics.plant_step(z, a, delta, 0.05, car, work)
+            dynamics.plant_step(z, a, delta, 0.05, car)
             if z[3] < 1.0:
                 break
             lateral = (z[4] - before[4]) / 0.05 + 0.5 * (before[3] * before[5] + z[3] * z[5])
@@ -152,10 +152,10 @@ def test_a_sliding_car_comes_to_rest_and_stays_there():
 
 def test_a_car_that_slides_sideways_is_braked_by_friction_alone():
     """Where v_x passes 0 the lateral velocity goes on: it falls by mu g at most."""
-    z, work = np.array([0.0, 0.0, 0.0, 1.0, 8.0, 0.0]), np.zeros((2, 6))
+    z = np.array([0.0, 0.0, 0.0, 1.0, 8.0, 0.0])
     for _ in range(40):
         before = z.copy()
-        dynamics.plant_step(z, -3.0, 0.0, 0.05, CAR, work)
+        dynamics.plant_step(z, -3.0, 0.0, 0.05, CAR)
         slowed = np.hypot(*before[3:5]) - np.hypot(*z[3:5])
         assert slowed <= 1.05 * CAR.mu * G * 0.05
 

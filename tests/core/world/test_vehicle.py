@@ -6,15 +6,15 @@ from scipy.integrate import solve_ivp
 
 from shared_control_env.core.parameters import VehicleParameters, critical_speed
 from shared_control_env.core.world import vehicle as dynamics
+from tests.compiled import change_through_step, step_with_derivatives
 
 VEHICLE = VehicleParameters()
 
 
 def drive(z, a, delta, duration, h, step=dynamics.extrapolated_step):
     z = np.array(z, dtype=float)
-    work = np.zeros((2, 6))
     for _ in range(round(duration / h)):
-        step(z, a, delta, h, VEHICLE, work)
+        step(z, a, delta, h, VEHICLE)
     return z
 
 
@@ -52,14 +52,9 @@ def test_convergence_order(step, order, speed):
     assert slope == pytest.approx(order, abs=0.25)
 
 
-def direction(angle):
-    return math.cos(angle), math.sin(angle)
-
-
-def implicit_step(z, a, delta, kappa, h, z_next):
-    """One step, which also hands on the direction that the car then has."""
-    heading = dynamics.implicit_step(z, direction(z[2]), a, delta, direction(delta), kappa, h, VEHICLE, z_next)
-    assert heading == direction(z_next[2])
+def implicit_step(z, a, delta, kappa, h):
+    """State after one step."""
+    return step_with_derivatives(z, a, delta, kappa, h, VEHICLE)[0]
 
 
 def test_implicit_step_is_first_order():
@@ -69,7 +64,7 @@ def test_implicit_step_is_first_order():
     for n in (100, 200, 400, 800):
         z = z0.copy()
         for _ in range(n):
-            implicit_step(z, -1.0, 0.03, 1 / 60, 0.5 / n, z)
+            z = implicit_step(z, -1.0, 0.03, 1 / 60, 0.5 / n)
         errors.append(np.abs(z - reference).max())
     slope = -np.polyfit(np.log([100, 200, 400, 800]), np.log(errors), 1)[0]
     assert slope == pytest.approx(1.0, abs=0.1)
@@ -109,9 +104,8 @@ def test_stable_at_every_speed_under_the_environments_step():
 def test_steady_cornering_matches_theory():
     v, delta = 15.0, 0.01
     z = np.array([0.0, 0.0, 0.0, v, 0.0, 0.0])
-    work = np.zeros((2, 6))
     for _ in range(200):
-        dynamics.plant_step(z, -z[5] * z[4], delta, 0.05, VEHICLE, work)
+        dynamics.plant_step(z, -z[5] * z[4], delta, 0.05, VEHICLE)
     p = VEHICLE
     wheelbase = p.l_f + p.l_r
     gradient = p.m * (p.l_r * p.C_r - p.l_f * p.C_f) / (2.0 * p.C_f * p.C_r * wheelbase)
@@ -126,24 +120,30 @@ def test_left_and_right_mirror():
 
 def test_jacobian_matches_finite_differences():
     rng = np.random.default_rng(0)
-    A, B, z_next = np.empty((6, 6)), np.empty((6, 2)), np.empty(6)
     for _ in range(200):
         z = rng.normal(size=6) * [1.0, 1.0, 0.3, 0.0, 0.5, 0.3] + [0, 0, 0, rng.uniform(0.5, 35.0), 0, 0]
         a, delta, kappa = rng.uniform(-5, 5), rng.uniform(-0.5, 0.5), rng.uniform(-0.02, 0.02)
-
-        def step(q, kappa=kappa):
-            out = np.empty(6)
-            implicit_step(q[:6], q[6], q[7], kappa, 0.05, out)
-            return out
-
+        step = lambda q, kappa=kappa: implicit_step(q[:6], q[6], q[7], kappa, 0.05)
         q = np.r_[z, a, delta]
         numeric = np.array([(step(q + e) - step(q - e)) / 2e-6 for e in 1e-6 * np.eye(8)]).T
-        heading = dynamics.implicit_step_jacobian(
-            z, direction(z[2]), a, delta, direction(delta), kappa, 0.05, VEHICLE, z_next, A, B
-        )
-        assert heading == direction(z_next[2])
+        _, A, B = step_with_derivatives(z, a, delta, kappa, 0.05, VEHICLE)
         np.testing.assert_allclose(np.c_[A, B], numeric, atol=1e-7)
-        np.testing.assert_array_equal(z_next, step(q))
+
+
+@pytest.mark.parametrize(("turn", "accuracy"), [(0.01, 1e-15), (0.1, 1e-15), (0.5, 1e-15), (1.0, 1.5e-11)])
+def test_the_direction_that_a_step_hands_on_is_that_of_its_heading(turn, accuracy):
+    for psi in np.linspace(-3.0, 3.0, 61):
+        for sign in (-1.0, 1.0):
+            found = dynamics.turned((math.cos(psi), math.sin(psi)), sign * turn)
+            exactly = math.cos(psi + sign * turn), math.sin(psi + sign * turn)
+            np.testing.assert_allclose(found, exactly, rtol=0.0, atol=accuracy)
+
+
+def test_a_state_changes_by_a_step_as_its_derivatives_say():
+    rng = np.random.default_rng(1)
+    z, x = np.array([0.0, 0.4, 0.1, 12.0, 0.3, 0.2]), rng.normal(size=6)
+    _, A, _ = step_with_derivatives(z, 1.0, 0.05, 0.01, 0.05, VEHICLE)
+    np.testing.assert_allclose(change_through_step(x, z, 1.0, 0.05, 0.01, 0.05, VEHICLE), A @ x, rtol=1e-12, atol=1e-14)
 
 
 def test_road_frame_and_cartesian_frame_agree_on_an_arc():
@@ -151,8 +151,8 @@ def test_road_frame_and_cartesian_frame_agree_on_an_arc():
     road = np.array([0.0, 0.5, 0.05, 12.0, 0.0, 0.2])
     plane = np.array([0.0, 0.5, 0.05, 12.0, 0.0, 0.2])
     for _ in range(10_000):
-        implicit_step(road, 0.3, 0.04, kappa, h, road)
-        implicit_step(plane, 0.3, 0.04, 0.0, h, plane)
+        dynamics.step_in_place(road, 0.3, 0.04, kappa, h, VEHICLE)
+        dynamics.step_in_place(plane, 0.3, 0.04, 0.0, h, VEHICLE)
     centre = np.array([0.0, 60.0])
     radius = np.hypot(*(plane[:2] - centre))
     angle = np.arctan2(plane[0], 60.0 - plane[1])

@@ -10,8 +10,7 @@ from scipy import sparse
 from scipy.optimize import minimize
 
 from shared_control_env.core import entries
-from shared_control_env.core.control import condensing
-from shared_control_env.core.control.driver import SLACKS
+from shared_control_env.core.control.driver import DRIVERS, SLACKS
 from shared_control_env.core.control.qp.active_set import (
     FAILED,
     ITERATION_LIMIT,
@@ -330,8 +329,8 @@ def driver_program(rng: Generator, H_c: int, H_p: int, internal: bool = False) -
     P, q, A = np.zeros((n, n)), np.zeros(n), np.zeros((rows + n, n))
     low, high = np.zeros(rows + n), np.zeros(rows + n)
     u_last = rng.uniform([-5.0, -0.1], [5.0, 0.1])
-    work = np.zeros((), condensing.WORKSPACE)
-    entries.build_program(scene, u_last, 0.5 * u_last, parameters, work, P, q, A, low, high)
+    work = np.zeros((), DRIVERS)
+    entries.build_program(scene.reshape(1), u_last, 0.5 * u_last, parameters, work, P, q, A, low, high)
     return P, q, A, low, high
 
 

@@ -70,17 +70,18 @@ def let_drive(
 
 @jit_inlined
 def let_allocate(i: int, alphas: np.ndarray, e: Environment, setup: Setup, work: Work) -> None:
-    """Fill the allocator's slot of a step, from the bound allocator or from the action.
+    """Fill the allocator's slot of a step, from the compiled allocator or from the action.
 
     Args:
         i: index of the environment.
-        alphas: authorities of the automation over each channel [-], shape (N, 2); ignored where an allocator is bound.
+        alphas: authorities of the automation over each channel [-], NaN where the compiled allocator decides,
+            shape (N, 2).
         e: environment i; ``signals.alpha``, clipped to [0, 1], and an allocator's ``signals.alert`` are written.
-        setup: what all environments share; its calls say whether an allocator is bound.
+        setup: what all environments share; its calls hold the allocator's address.
         work: scratch.
     """
     over_a, over_delta = alphas[i, 0], alphas[i, 1]
-    if setup.calls.allocate != 0:
+    if setup.calls.allocate != 0 and np.isnan(over_a):
         situation = Situation(
             e.scene,
             e.signals,

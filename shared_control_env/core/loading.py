@@ -55,7 +55,7 @@ def begin(driver: bool, limiter: bool) -> None:
     )
 
 
-def load(driver: bool, allocate: Callable[..., float] | None, observation: Observation) -> Calls:
+def load(driver: bool, allocate: Callable[..., Any] | None, observation: Observation) -> Calls:
     """Compile the functions that are not in numba's cache, on two cores if possible, and return all addresses.
 
     Args:

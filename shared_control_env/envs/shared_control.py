@@ -14,6 +14,7 @@ from shared_control_env.controllers.automation import Automation, Planner
 from shared_control_env.controllers.driver import checked_command
 from shared_control_env.controllers.solution import Solution
 from shared_control_env.core import kernel
+from shared_control_env.core.authority.allocators import fuzzy_authority
 from shared_control_env.core.batch import (
     NOT_LOADED,
     WORK,
@@ -42,6 +43,9 @@ from shared_control_env.envs.highway.vehicles import EgoVehicle, LaneFollower, v
 from shared_control_env.envs.highway.viewer import SharedControlViewer
 from shared_control_env.envs.seeds import checked_seed
 from shared_control_env.envs.starts import count_vehicles, has_left, refresh_addresses, start_of, write_start
+
+INFOS = 16
+"""Number of steps for whose infos memory is allocated at once, since one allocation takes half a kernel's step."""
 
 
 class SharedControlEnv(HighwayEnv):
@@ -98,7 +102,7 @@ class SharedControlEnv(HighwayEnv):
         self._adopted: dict[str, Any] | None = None
         self._spec: Any = None
         self._works, self._programs = np.zeros(1, WORK), np.zeros(1, PROGRAM)
-        self._commands, self._alphas = np.zeros((1, 2)), np.zeros((1, 2))
+        self._commands, self._alphas, self._infos = np.zeros((1, 2)), np.zeros((1, 2)), np.empty(0, INFO)
         self._kernel: Callable[..., None] | None = None
         self._taken, self._everyone = np.zeros(1, dtype=np.int64), np.ones(1, dtype=bool)
         self._rewarded, self._ends = np.zeros((1, 1)), np.zeros((1, 1), dtype=bool)
@@ -306,7 +310,7 @@ class SharedControlEnv(HighwayEnv):
     def _load(self) -> None:
         """Load or compile all functions that a step calls, unless this was done before."""
         if self._calls == NOT_LOADED:
-            self._calls = load(False, None, self._observation)
+            self._calls = load(False, fuzzy_authority, self._observation)
 
     def _run_kernel(self) -> None:
         """Run one step of the kernel on the batch of size one."""
@@ -361,7 +365,10 @@ class SharedControlEnv(HighwayEnv):
         every_frame = recorder is not None and recorder.recording and frames > 1
         # The caller may keep observation and info, so new arrays are used in each step.
         kept, new = self._outputs, np.empty((1, self._observation.size), np.float32)
-        self._outputs = Outputs(new, kept.rewards, kept.terminations, kept.truncations, np.empty(1, INFO), kept.drivers)
+        if len(self._infos) == 0:
+            self._infos = np.empty(INFOS, INFO)
+        infos, self._infos = self._infos[:1], self._infos[1:]
+        self._outputs = Outputs(new, kept.rewards, kept.terminations, kept.truncations, infos, kept.drivers)
         self._batch.ended[0] = resetting
         if self._given_automation is None and not self._foreign and not every_frame and len(self._corners) <= MAX_HOLES:
             ego = self.vehicle

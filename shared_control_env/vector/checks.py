@@ -22,11 +22,11 @@ ONE_FOR_ALL = ("simulation_frequency", "policy_frequency", "duration", "other_ve
 
 
 class Actions(NamedTuple):
-    """Both slots of the actions of all environments. A bound slot holds zeros.
+    """Both slots of the actions of all environments.
 
     Attributes:
-        commands: the driver's commands as shares of their limits, shape (N, 2) [-].
-        alphas: authorities over acceleration and steering, shape (N, 2) [-].
+        commands: the driver's commands as shares of their limits, zeros where a driver is bound, shape (N, 2) [-].
+        alphas: authorities over acceleration and steering, NaN where an allocator is bound, shape (N, 2) [-].
     """
 
     commands: np.ndarray
@@ -43,17 +43,17 @@ class OpenSlots:
     Attributes:
         num_envs: number of environments N.
         slots: names of the open slots.
-        no_actions: actions with zeros in both slots.
+        no_actions: actions with both slots bound.
         clipping: counts the values beyond their bounds.
     """
 
     def __init__(self, num_envs: int, slots: tuple[str, ...]) -> None:
         self.num_envs, self.slots = num_envs, slots
-        self.no_actions = Actions(np.zeros((num_envs, 2)), np.zeros((num_envs, 2)))
+        self.no_actions = Actions(np.zeros((num_envs, 2)), np.full((num_envs, 2), np.nan))
         self.clipping = Clipping(num_envs)
 
     def checked(self, actions: Any) -> Actions:
-        """Check the actions of one step. Bound slots are filled with zeros.
+        """Check the actions of one step, and fill the bound slots.
 
         Args:
             actions: values of the open slot, shape (N, size) [-], or a dict of both slots.

@@ -45,8 +45,8 @@ class SlotWrapper(gym.ActionWrapper):
         """The bare environment."""
         return self.unwrapped  # type: ignore[return-value]
 
-    def decide(self) -> np.ndarray:
-        """Value of the bound slot at this step."""
+    def decide(self) -> np.ndarray | None:
+        """Value of the bound slot at this step; None where the environment itself decides."""
         raise NotImplementedError
 
     def action(self, action: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -112,6 +112,12 @@ def orient(triangles: np.ndarray) -> None:
 
 
 @jit
+def _length(s: float, d: float) -> float:
+    """Length of a vector [m]. Coordinates of a road cannot overflow, which the slower hypot guards against."""
+    return sqrt(s * s + d * d)
+
+
+@jit
 def _left_and_right(triangles: np.ndarray, i: int, edge: int) -> tuple[float, float, float, float]:
     """Left end (s, d) and right end (s, d) of an edge, as seen on leaving a counter-clockwise triangle over it."""
     right, left = triangles[i, edge], triangles[i, (edge + 1) % 3]
@@ -142,11 +148,16 @@ def adjacency(triangles: np.ndarray, neighbours: np.ndarray) -> None:
     """
     n = triangles.shape[0]
     for i in range(n):
+        neighbours[i, 0] = neighbours[i, 1] = neighbours[i, 2] = -1
+    for i in range(n):
         for edge in range(3):
-            neighbours[i, edge] = -1
-            for j in range(n):
-                if _same_edge(triangles, i, edge, j) >= 0:
-                    neighbours[i, edge] = j
+            if neighbours[i, edge] >= 0:
+                continue  # found from the other side
+            for j in range(i + 1, n):
+                other = _same_edge(triangles, i, edge, j)
+                if other >= 0:
+                    neighbours[i, edge], neighbours[j, other] = j, i
+                    break
 
 
 @jit_inlined
@@ -170,7 +181,7 @@ def _edge_distance(triangles: np.ndarray, i: int, edge: int, s: float, d: float)
     es, ed = b[0] - a[0], b[1] - a[1]
     along = ((s - a[0]) * es + (d - a[1]) * ed) / (es * es + ed * ed)
     along = min(max(along, 0.0), 1.0)
-    return hypot(s - a[0] - along * es, d - a[1] - along * ed)
+    return _length(s - a[0] - along * es, d - a[1] - along * ed)
 
 
 @jit
@@ -199,9 +210,9 @@ def clearance(
         stack: stack of a :class:`Scratch`, overwritten.
     """
     ls, ld, rs, rd = _left_and_right(triangles, i, entry)
-    width = hypot(ls - rs, ld - rd)
+    width = _length(ls - rs, ld - rd)
     ls, ld, rs, rd = _left_and_right(triangles, i, leave)
-    width = min(width, hypot(ls - rs, ld - rd))
+    width = min(width, _length(ls - rs, ld - rd))
     across = 3 - entry - leave
     s, d = triangles[i, (across + 2) % 3, 0], triangles[i, (across + 2) % 3, 1]
     stack[0, 0], stack[0, 1] = i, across
@@ -266,7 +277,7 @@ def _search(
             if j < 0 and not on_front:
                 continue
             ms, md = 0.5 * (ls + rs), 0.5 * (ld + rd)
-            way = distance[i] + hypot(ms - at[i, 0], md - at[i, 1])
+            way = distance[i] + _length(ms - at[i, 0], md - at[i, 1])
             if way >= (goal_distance if j < 0 else distance[j]):
                 continue
             if clearance(triangles, neighbours, i, entry[i], edge, start, end, scratch.stack) < min_width:

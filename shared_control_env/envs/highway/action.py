@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import nan
 from typing import Any
 
 from gymnasium import spaces
@@ -39,19 +40,20 @@ class SlotAction(ActionType):
         """Split an action into the driver's desired command and the automation's authority.
 
         Args:
-            action: dict with the keys ``driver`` and ``authority``.
+            action: dict with the keys ``driver`` and ``authority``. With None for the authority, the fuzzy inference
+                with the operators of the settings decides on it.
 
         Returns:
             u_h,des, ``[a, delta]`` as shares of their limits in [-1, 1] [-]; and one authority, or those over both
-            channels [-].
+            channels [-], or NaN for the fuzzy inference.
 
         Raises:
             ValueError: if a slot is missing, unknown, of the wrong shape or not finite.
         """
-        if not isinstance(action, dict | Mapping) or action.keys() != SLOT_SPACES.keys():
+        if not isinstance(action, Mapping) or action.keys() != SLOT_SPACES.keys():
             raise ValueError(
                 f"action = {action!r} must be a dict with the keys {sorted(SLOT_SPACES)}; the wrappers "
                 "AuthorityLimiter and DriverModel bind one each"
             )
-        command = checked_slot(DRIVER, action[DRIVER], self.clipping)
-        return command, checked_slot(AUTHORITY, action[AUTHORITY], self.clipping)
+        command, authority = checked_slot(DRIVER, action[DRIVER], self.clipping), action[AUTHORITY]
+        return command, [nan] if authority is None else checked_slot(AUTHORITY, authority, self.clipping)

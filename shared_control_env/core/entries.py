@@ -22,6 +22,7 @@ Boxed: TypeAlias = Any
 """A record held in a 0-d array."""
 
 _automate, _allocate = automation.AUTOMATE.call, allocators.ALLOCATE.call
+_decide, _advance = replay.DECIDE.call, replay.ADVANCE.call
 
 
 @jit
@@ -85,7 +86,7 @@ def decide(
         line: reference line, shape (m, 12).
         work: scratch, shape (3, 8).
     """
-    replay.decide(me, plans, traffic, ego, step, dt, line, work)
+    _decide(plans[me].decide, me, plans, traffic, ego, step, dt, line, work)
 
 
 @jit
@@ -97,7 +98,7 @@ def advance(
     Args:
         me, plans, traffic, ego, step, dt, line: as for :func:`decide`.
     """
-    replay.advance(me, plans, traffic, ego, step, dt, line)
+    _advance(plans[me].advance, me, plans, traffic, ego, step, dt, line)
 
 
 @jit

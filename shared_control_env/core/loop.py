@@ -8,7 +8,7 @@ lets the automations of eight environments decide at once::
 
     perceive             scene      road frame, neighbours, driving region, targets
     find_safe_area       C          safe area (Table I)
-    decide_automation    u_a,des    the automation's desired command (Eq. 12, 13)
+    (automation)         u_a,des    the automation's desired command (Eq. 12, 13)
     degrade_command      u_a,f      the degraded command (Eq. 17, 18)
     assess               xi         prediction under u_a,f over tau_p (Eq. 1)
                          r_y, r_x   lateral and longitudinal risk (Eq. 2-8)

@@ -456,6 +456,7 @@ class TrafficParameters(NamedTuple):
         shift: lateral displacement of the lane change, positive to the left [m].
         track: address of a recorded track, rows X to YAW_RATE at the simulation steps; 0 for none. A vehicle with a
             track replays it until ``follows`` is set, which the core does once the ego makes the record impossible.
+        decide, advance: addresses of the functions that move a vehicle with a track, see :mod:`world.replay`.
         ego_track: address of the track of the vehicle whose place the ego has taken; 0 for none.
         steps: number of rows of the track.
         first: first simulation step at which the vehicle is there.
@@ -470,6 +471,8 @@ class TrafficParameters(NamedTuple):
     change_duration: Positive = 3.0
     shift: float = 0.0
     track: int = 0
+    decide: int = 0
+    advance: int = 0
     ego_track: int = 0
     steps: Int32 = 0
     first: Int32 = 0

@@ -204,5 +204,5 @@ def refresh_addresses(episodes: Sequence[Settings], starts: Starts | Batch) -> N
             starts.faults[name][i, : len(faults)] = faults[name]
         if episode.recording is not None and episode.recording.drawn:
             plans = recorded(episode).plans
-            for name in ("track", "ego_track"):
+            for name in ("track", "decide", "advance", "ego_track"):
                 starts.plans[name][i, : len(plans)] = plans[name]

@@ -30,7 +30,7 @@ class Program:
 
     Attributes:
         active_set: scratch of the solver.
-        P, q, A, low, high: the program, see :func:`control.driver.build_program`.
+        P, q, A, low, high: the program, see :func:`control.driver.program_of`.
         x: solution of the program.
         multipliers: Lagrange multipliers of the rows of A.
         seen: the scene as a person perceives it.

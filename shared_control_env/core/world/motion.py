@@ -21,8 +21,11 @@ from shared_control_env.core.records import (
 )
 from shared_control_env.core.world.actuator import actuate
 from shared_control_env.core.world.collision import overlap
-from shared_control_env.core.world.replay import advance, decide
+from shared_control_env.core.world.replay import ADVANCE, AWAY, DECIDE
+from shared_control_env.core.world.traffic import decide_acceleration, move_along
 from shared_control_env.core.world.vehicle import plant_step
+
+decide, advance = DECIDE.call, ADVANCE.call
 
 
 class Motion:
@@ -67,18 +70,24 @@ def move(
         transition: record of :data:`records.TRANSITION`; ``crashed`` is set on a collision.
         work: scratch.
     """
-    realised, row = memory.realised, work.row
+    realised, row = memory.realised, work.row[:]
     row[BODY_LENGTH], row[BODY_WIDTH] = p.vehicle.length, p.vehicle.width
     for frame in range(frames):
         row[X], row[Y], row[HEADING], row[SPEED] = state[0], state[1], state[2], state[3]
         step = k * frames + frame
         for j in range(traffic.shape[0]):
-            decide(j, plans, traffic, row, step, dt, line, work.trial)
+            if plans[j].track != 0:
+                decide(plans[j].decide, j, plans, traffic, row, step, dt, line, work.trial[:])
+            elif traffic[j, X] != AWAY:
+                decide_acceleration(traffic[j], plans[j], step * dt, row, traffic, line)
         actuate(signals.u, dt, p.actuator, realised)
         plant_step(state, realised[0], realised[1], dt, p.vehicle)
         row[X], row[Y], row[HEADING] = state[0], state[1], state[2]
         for j in range(traffic.shape[0]):
-            advance(j, plans, traffic, row, step, dt, line)
+            if plans[j].track != 0:
+                advance(plans[j].advance, j, plans, traffic, row, step, dt, line)
+            elif traffic[j, X] != AWAY:
+                move_along(traffic[j], plans[j], line, step * dt, dt)
         for j in range(traffic.shape[0]):
             if overlap(row, traffic[j]):
                 transition.crashed = True

@@ -11,6 +11,7 @@ from math import cos, sin
 
 import numpy as np
 
+from shared_control_env.core.compile.calls import MATRIX, VECTOR, Interface, array_of
 from shared_control_env.core.compile.jit import jit
 from shared_control_env.core.compile.memory import number_at
 from shared_control_env.core.parameters import TrafficParameters
@@ -184,7 +185,6 @@ def must_react(
     return False
 
 
-@jit
 def decide(
     me: int,
     plans: np.ndarray,
@@ -218,7 +218,6 @@ def decide(
     decide_acceleration(traffic[me], plans[me], step * dt, ego, traffic, line)
 
 
-@jit
 def advance(
     me: int, plans: np.ndarray, traffic: np.ndarray, ego: np.ndarray, step: int, dt: float, line: np.ndarray
 ) -> None:
@@ -237,3 +236,12 @@ def advance(
         play(traffic[me], plans[me], step + 1, ego, traffic, me)
     elif traffic[me, X] != AWAY:
         move_along(traffic[me], plans[me], line, step * dt, dt)
+
+
+_PLANS = array_of(TrafficParameters)
+
+DECIDE = Interface(None, int, _PLANS, MATRIX, VECTOR, int, float, MATRIX, MATRIX)
+"""``decide(me, plans, traffic, ego, step, dt, line, work)``, compiled only where there are recorded tracks."""
+
+ADVANCE = Interface(None, int, _PLANS, MATRIX, VECTOR, int, float, MATRIX)
+"""``advance(me, plans, traffic, ego, step, dt, line)``, compiled only where there are recorded tracks."""

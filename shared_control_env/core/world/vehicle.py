@@ -243,10 +243,27 @@ def step_in_place(z: np.ndarray, a: float, delta: float, kappa: float, h: float,
         vehicle: parameters of the vehicle.
     """
     heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
-    axles = linear_axles(vehicle)
-    z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R] = implicit_step(
-        (z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R]), heading, a, delta, wheel, kappa, h, vehicle, axles
-    )[0]
+    start = z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R]
+    (z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R]), _ = _step_of_one(
+        start, heading, a, delta, wheel, kappa, h, vehicle, linear_axles(vehicle)
+    )
+
+
+@jit
+def _step_of_one(
+    z: State,
+    heading: Direction,
+    a: float,
+    delta: float,
+    wheel: Direction,
+    kappa: float,
+    h: float,
+    vehicle: VehicleParameters,
+    axles: Axles,
+) -> tuple[State, Direction]:
+    """State and direction after :func:`implicit_step`, which is compiled once for all that step a single car."""
+    z, heading, _ = implicit_step(z, heading, a, delta, wheel, kappa, h, vehicle, axles)
+    return z, heading
 
 
 @jit_inlined
@@ -273,7 +290,7 @@ def transmitted(a: float, vehicle: VehicleParameters) -> float:
     return min(max(a, -bound), bound)
 
 
-@jit_inlined
+@jit
 def axles_at(z: State, a: float, delta: float, vehicle: VehicleParameters) -> Axles:
     """Both axles at a state: their stiffness is the secant of the tyres' forces at the present slip.
 
@@ -447,10 +464,10 @@ def extrapolated_step(z: np.ndarray, a: float, delta: float, h: float, vehicle: 
     start = z[S], z[Y], z[PSI], z[V_X], z[V_Y], z[R]
     heading, wheel = (cos(z[PSI]), sin(z[PSI])), (cos(delta), sin(delta))
     axles = axles_at(start, a, delta, vehicle)
-    coarse = implicit_step(start, heading, a, delta, wheel, 0.0, h, vehicle, axles)[0]
-    half, heading, _ = implicit_step(start, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles)
+    coarse, _ = _step_of_one(start, heading, a, delta, wheel, 0.0, h, vehicle, axles)
+    half, heading = _step_of_one(start, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles)
     axles = axles_at(half, a, delta, vehicle)
-    fine = implicit_step(half, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles)[0]
+    fine, _ = _step_of_one(half, heading, a, delta, wheel, 0.0, 0.5 * h, vehicle, axles)
     for i in range(6):
         z[i] = 2.0 * fine[i] - coarse[i]
     z[V_X] = max(0.0, z[V_X])

@@ -10,7 +10,7 @@ import numpy as np
 
 from shared_control_env.core.parameters import TrafficParameters
 from shared_control_env.core.records import BODY_LENGTH, BODY_WIDTH, HEADING, SPEED, YAW_RATE, X, Y, pack, record_dtype
-from shared_control_env.core.world.replay import AWAY, TRACK_COLUMNS
+from shared_control_env.core.world.replay import ADVANCE, AWAY, DECIDE, TRACK_COLUMNS, advance, decide
 from shared_control_env.core.world.road import S0, WIDTH, locate
 from shared_control_env.envs.recorded.commonroad import read_commonroad
 from shared_control_env.envs.recorded.recording import Recording
@@ -182,6 +182,8 @@ def _made(path: Path, changed: int, size: int, ego: str, dt: float, steps: int) 
             TrafficParameters(
                 desired_speed=max(SLOWEST, float(tracks[i, :, SPEED].max())),
                 track=tracks[i].ctypes.data,
+                decide=DECIDE.address(decide),
+                advance=ADVANCE.address(advance),
                 ego_track=0 if human is None else human.ctypes.data,
                 steps=steps + 1,
                 first=ends[0],

@@ -128,7 +128,7 @@ def with_interval(row: dict[str, Any], name: str, digits: int = 2) -> str:
         name: column of the estimate.
         digits: number of decimals.
     """
-    value, low, high = (f"{row[name + end]:.{digits}f}" for end in ("", "_low", "_high"))
+    value, low, high = (f"{row[name + end]:z.{digits}f}" for end in ("", "_low", "_high"))
     return f"{value} ({low} to {high})"
 
 

@@ -219,7 +219,7 @@ class Work:
 
     Attributes:
         members: indices of the environments of a block that make this step, see :mod:`core.kernel`.
-        drivers: indices of those of them that do not begin an episode.
+        driving: indices of those of them that do not begin an episode.
         automations: the automation's problems of the block.
         finding: scratch of the search for the safe area.
         automation_view: the scene as the automation perceives it.
@@ -229,7 +229,7 @@ class Work:
     """
 
     members: Annotated[np.ndarray, (WIDTH,), np.int64]
-    drivers: Annotated[np.ndarray, (WIDTH,), np.int64]
+    driving: Annotated[np.ndarray, (WIDTH,), np.int64]
     automations: Automations
     finding: Finding
     automation_view: Scene

@@ -99,7 +99,7 @@ def let_allocate(i: int, alphas: np.ndarray, e: Environment, setup: Setup, work:
 
 @jit_inlined
 def ask_drivers(count: int, batch: Batch, setup: Setup, out: Outputs, work: Work, program: Program) -> None:
-    """Let the bound driver, if there is one, decide in the environments ``work.drivers``.
+    """Let the bound driver, if there is one, decide in the environments ``work.driving``.
 
     Args:
         count: number of these environments.
@@ -112,7 +112,7 @@ def ask_drivers(count: int, batch: Batch, setup: Setup, out: Outputs, work: Work
     if setup.calls.drive != 0 and count > 0:
         drive(
             setup.calls.drive,
-            work.drivers[:count],
+            work.driving[:count],
             batch.scenes,
             batch.parameters,
             batch.memories,
@@ -215,7 +215,7 @@ def choose_members(
         active: whether each environment is advanced, shape (N,).
         autoreset: whether an environment whose episode has ended begins the next one in this step.
         batch: state of all environments.
-        work: scratch; ``members`` and ``drivers`` are written.
+        work: scratch; ``members`` and ``driving`` are written.
 
     Returns:
         Numbers of members and of drivers.
@@ -226,7 +226,7 @@ def choose_members(
             work.members[count] = i
             count += 1
             if not batch.ended[i]:
-                work.drivers[driving] = i
+                work.driving[driving] = i
                 driving += 1
     return count, driving
 
@@ -247,7 +247,7 @@ def advance_block(
 
     Args:
         count: number of members.
-        driving: number of those that do not begin an episode, ``work.drivers``.
+        driving: number of those that do not begin an episode, ``work.driving``.
         commands: the driver's commands divided by their limits [-], shape (N, 2).
         alphas: authorities of the automation over each channel [-], shape (N, 2).
         batch: state of all environments; the entries of the members are written.
@@ -366,7 +366,7 @@ def respond(
     """
     e, work = environment(0, batch), works[0]
     depart(e)
-    work.drivers[0] = 0
+    work.driving[0] = 0
     ask_drivers(1, batch, setup, out, work, programs[0])
     let_drive(0, 0, commands, e.p, setup, work, programs[0])
     let_allocate(0, alphas, e, setup, work)

@@ -143,6 +143,19 @@ def free_rectangle(area: SafeArea, distance: float) -> tuple[float, float, float
 
 
 @jit
+def _crossing(chain: np.ndarray, s: float, side: float) -> float:
+    """Smallest value of ``side * d`` at which a chain crosses path length s; inf if it does not."""
+    least = np.inf
+    for k in range(MAX_CHAIN - 1):
+        s1, d1, s2, d2 = chain[k, 0], chain[k, 1], chain[k + 1, 0], chain[k + 1, 1]
+        if k > 0 and s1 == s2 and d1 == d2:
+            break  # a shorter chain repeats its last vertex
+        if (s1 <= s) != (s2 <= s):
+            least = min(least, side * (d1 + (d2 - d1) * (s - s1) / (s2 - s1)))
+    return least
+
+
+@jit
 def lateral_bounds(area: SafeArea, s: float) -> tuple[float, float]:
     """Lateral extent of C at path length s, from the highest lower boundary to the lowest upper boundary.
 
@@ -154,12 +167,4 @@ def lateral_bounds(area: SafeArea, s: float) -> tuple[float, float]:
         ``low, high``: lateral positions [m].
     """
     s = min(max(s, area.start), area.end - ON_LINE)
-    low, high = -np.inf, np.inf
-    for k in range(MAX_CHAIN - 1):
-        s1, d1, s2, d2 = area.lower[k, 0], area.lower[k, 1], area.lower[k + 1, 0], area.lower[k + 1, 1]
-        if (s1 <= s) != (s2 <= s):
-            low = max(low, d1 + (d2 - d1) * (s - s1) / (s2 - s1))
-        s1, d1, s2, d2 = area.upper[k, 0], area.upper[k, 1], area.upper[k + 1, 0], area.upper[k + 1, 1]
-        if (s1 <= s) != (s2 <= s):
-            high = min(high, d1 + (d2 - d1) * (s - s1) / (s2 - s1))
-    return low, high
+    return -_crossing(area.lower, s, -1.0), _crossing(area.upper, s, 1.0)

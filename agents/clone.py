@@ -240,7 +240,7 @@ def main(
                     f"Lateral RMS in {episodes:,} held-out episodes: {means['clone']:.4f} m, {driver} "
                     f"{means[driver]:.4f} m (ratio {means['clone'] / means[driver]:.2f})."
                 )
-    except ValueError as error:
+    except (ImportError, ValueError) as error:
         raise typer.BadParameter(str(error)) from None
 
 

@@ -139,7 +139,7 @@ def main(
                 bar.advance(running)
         about = {"driver": driver, "noise": noise, "versions": versions()}
         write_dataset(dataset, [each.buffer(i) for i, each in enumerate(found)], made, about)
-    except ValueError as error:
+    except (ImportError, ValueError) as error:
         raise typer.BadParameter(str(error)) from None
     steps = sum(map(len, found))
     console.print(

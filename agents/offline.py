@@ -30,8 +30,8 @@ ALGORITHMS = {"td3_plus_bc": TD3PlusBCConfig, "iql": IQLConfig, "bc": BCConfig}
 GAMMA = 0.98
 """Discount of a step, as in training by reward [-]."""
 
-POLICY, MODEL, PROGRESS = "policy.npz", "model.pt", "progress.json"
-"""Files of a learning: the policy, d3rlpy's networks, and the progress."""
+POLICY, PROGRESS = "policy.npz", "progress.json"
+"""Files of a learning: the policy and the progress; beside them lie d3rlpy's networks after the last steps."""
 
 
 def buffer_of(samples: Samples) -> MDPDataset:
@@ -83,7 +83,7 @@ def main(
         card = new_card(algo, "driver", seed, parameters, {dataset.id: dataset.config}, 0.0, used)
         card["dataset"] = dataset.about
         done = progress_of(folder, card)
-    except ValueError as error:
+    except (ImportError, ValueError) as error:
         raise typer.BadParameter(str(error)) from None
     learner = ALGORITHMS[algo](observation_scaler=StandardObservationScaler(), **parameters).create(device="cpu:0")
     buffer = buffer_of(joined(dataset.episodes))
@@ -91,19 +91,50 @@ def main(
     d3rlpy.seed(seed + done)
     learner.build_with_dataset(buffer)
     if done:
-        learner.load_model(folder / MODEL)
+        learner.load_model(model_after(folder, done))
     folder.mkdir(parents=True, exist_ok=True)
     while done < steps:
         count = min(epoch, steps - done)
         d3rlpy.seed(seed + done)
         learner.fit(buffer, count, count, logger_adapter=NoopAdapterFactory(), save_interval=2)
         done += count
-        learner.save_model(folder / MODEL)
-        policy_of(learner, {**card, "steps": done}).save(folder / POLICY)
-        (folder / PROGRESS).write_text(json.dumps({"card": card, "steps": done}, indent=1))
+        keep(folder, learner, card, done)
     typer.echo(
         f"{done:,} steps; the policy is {folder / POLICY}. To compare it: python -m agents.evaluate {folder / POLICY}"
     )
+
+
+def model_after(folder: Path, steps: int) -> Path:
+    """File of d3rlpy's networks after a number of steps.
+
+    Args:
+        folder: folder of the learning.
+        steps: number of steps of the optimiser.
+    """
+    return folder / f"model-{steps}.pt"
+
+
+def keep(folder: Path, learner: Any, card: dict[str, Any], done: int) -> None:
+    """Write what a learning needs to go on; the progress is written last, so that a kill leaves the state before.
+
+    Args:
+        folder: folder of the learning.
+        learner: learner of d3rlpy.
+        card: card of the learning.
+        done: number of steps so far.
+    """
+    before = set(folder.glob("model-*.pt"))
+    learner.save_model(model_after(folder, done))
+    progress = json.dumps({"card": card, "steps": done}, indent=1)
+    for name, write in (
+        (POLICY, policy_of(learner, {**card, "steps": done}).save),
+        (PROGRESS, lambda draft: draft.write_text(progress)),
+    ):
+        draft = folder / f"draft-{name}"
+        write(draft)
+        draft.replace(folder / name)
+    for path in before - {model_after(folder, done)}:
+        path.unlink()
 
 
 def progress_of(folder: Path, card: dict[str, Any]) -> int:
@@ -116,13 +147,9 @@ def progress_of(folder: Path, card: dict[str, Any]) -> int:
     Raises:
         ValueError: if the folder holds something else.
     """
-    if not (folder / PROGRESS).is_file():
-        check_goes_on(folder, None, card, "learning")
-        return 0
-    state = json.loads((folder / PROGRESS).read_text())
-    if state["card"] != json.loads(json.dumps(card)):
-        raise ValueError(f"{folder} holds a learning with other arguments; choose another --out")
-    return int(state["steps"])
+    state = json.loads((folder / PROGRESS).read_text()) if (folder / PROGRESS).is_file() else None
+    check_goes_on(folder, state and state["card"], card, "learning")
+    return int(state["steps"]) if state else 0
 
 
 if __name__ == "__main__":

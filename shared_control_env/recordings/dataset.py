@@ -15,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 
 from shared_control_env.evaluation.catalogue import AUTHORITIES
+from shared_control_env.recordings.samples import import_minari
 from shared_control_env.recordings.trial import Trial
 
 FUZZY = ("paper", "proportional", "display")
@@ -150,6 +151,7 @@ def check_new(dataset_id: str) -> None:
         ImportError: without Minari (extra ``minari``).
         ValueError: if the name is none, or taken.
     """
+    import_minari()
     from minari.dataset.minari_dataset import parse_dataset_id
     from minari.storage.datasets_root_dir import get_dataset_path
 
@@ -174,7 +176,7 @@ def write_dataset(
     Returns:
         The dataset.
     """
-    import minari
+    minari = import_minari()
 
     check_new(dataset_id)
     dataset = minari.create_dataset_from_buffers(

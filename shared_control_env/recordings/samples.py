@@ -57,6 +57,19 @@ class Data(NamedTuple):
     episodes: list[Samples]
 
 
+def import_minari() -> Any:
+    """Minari, which an extra installs.
+
+    Raises:
+        ImportError: without it; the message says what to install.
+    """
+    try:
+        import minari
+    except ImportError:
+        raise ImportError('datasets need Minari: pip install "shared_control_env[minari]"') from None
+    return minari
+
+
 def samples_of(dataset_id: str) -> Data:
     """Read a Minari dataset of this package.
 
@@ -67,7 +80,7 @@ def samples_of(dataset_id: str) -> Data:
         ImportError: without Minari (extra ``minari``).
         ValueError: if there is no such dataset, or if it is none of this package.
     """
-    import minari
+    minari = import_minari()
 
     try:
         dataset = minari.load_dataset(dataset_id)

@@ -1,5 +1,7 @@
 """Learning from demonstrations: the dataset, the clone, and what both refuse."""
 
+import sys
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -219,3 +221,11 @@ def test_a_recorded_driver_has_an_arm_of_the_population_unless_it_has_its_own(na
         assert len({(lag.K_h, lag.T_h) for lag in lags}) == 3
     else:
         assert all(getattr(lag, field) == value for lag in lags for field, value in own.items())
+
+
+@pytest.mark.parametrize(("main", "option"), [(demonstrate.main, "--dataset"), (clone.main, "--data")])
+def test_without_minari_the_commands_say_what_to_install(main, option, monkeypatch):
+    monkeypatch.setitem(sys.modules, "minari", None)
+    code, said = run(main, option, "shared-control/none-v0")
+    assert code == 2
+    assert "shared_control_env[minari]" in said

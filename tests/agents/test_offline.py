@@ -1,5 +1,7 @@
 """Offline learning with d3rlpy; run by ``make offline`` in a virtual environment of its own."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -96,7 +98,25 @@ def test_a_learning_learns_and_goes_on(tmp_path):
     assert LearnedDriver(policy).act(np.zeros(DRIVER_V0.size), {"felt": np.zeros(2)}).shape == (2,)
     code, said = run("--algo", "iql", "--out", str(tmp_path / "bc"))
     assert code == 2
-    assert "other arguments; choose another --out" in said
+    assert "algorithm = 'bc', not 'iql'" in said
+    assert sorted(path.name for path in (tmp_path / "bc").iterdir()) == ["model-400.pt", "policy.npz", "progress.json"]
+
+
+def test_a_learning_killed_between_two_files_goes_on_from_before(tmp_path, monkeypatch):
+    arguments = ("--algo", "bc", "--epoch", "100")
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    run(*arguments, "--steps", "200", "--out", str(whole))
+    run(*arguments, "--steps", "100", "--out", str(cut))
+    with monkeypatch.context() as patch:
+        patch.setattr(offline.Policy, "save", lambda *_: (_ for _ in ()).throw(OSError("killed")))
+        with pytest.raises(OSError, match="killed"):
+            run(*arguments, "--steps", "200", "--out", str(cut))
+    assert json.loads((cut / "progress.json").read_text())["steps"] == 100
+    run(*arguments, "--steps", "200", "--out", str(cut))
+    for mine, theirs in zip(
+        Policy.load(cut / "policy.npz").layers, Policy.load(whole / "policy.npz").layers, strict=True
+    ):
+        np.testing.assert_array_equal(mine[0], theirs[0])
 
 
 def test_an_unknown_algorithm_is_refused(tmp_path):

@@ -456,7 +456,8 @@ class TrafficParameters(NamedTuple):
         shift: lateral displacement of the lane change, positive to the left [m].
         track: address of a recorded track, rows X to YAW_RATE at the simulation steps; 0 for none. A vehicle with a
             track replays it until ``follows`` is set, which the core does once the ego makes the record impossible.
-        decide, advance: addresses of the functions that move a vehicle with a track, see :mod:`world.replay`.
+        decide: address of the function that decides how a vehicle with a track moves, see :mod:`world.replay`.
+        advance: address of the function that moves it.
         ego_track: address of the track of the vehicle whose place the ego has taken; 0 for none.
         steps: number of rows of the track.
         first: first simulation step at which the vehicle is there.

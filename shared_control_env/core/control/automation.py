@@ -11,7 +11,6 @@ at 15 m/s, and 0.99 m, not 0.86 m, at 25 m/s; the car settles 0.1 to 0.25 s earl
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import Annotated
 
 import numpy as np
@@ -40,7 +39,7 @@ from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import AutomationMemory, Scene, Signals, record_dtype
 from shared_control_env.core.risk.lateral import continuous_field, cut_off
 from shared_control_env.core.risk.safe_area import free_rectangle
-from shared_control_env.core.world.vehicle import PSI, V_X, R, S, Y, derivatives, implicit_step, linear_axles, turned
+from shared_control_env.core.world.vehicle import V_X, R, S, Y, derivatives, implicit_step, linear_axles, turned
 
 CONVERGED, ITERATION_LIMIT, FAILED = 0, 1, 2
 """Statuses: stationary to :data:`TOLERANCE`; stopped before that; a value that is not finite."""
@@ -57,7 +56,6 @@ class Automations:
 
     Attributes:
         block: the block; its weights and horizons are those of Eq. 13.
-        heading: cosine and sine of the heading at the present.
         unaffected: rectangle [start, end, low, high] in the road frame in which the field is 0 [m].
         point: position (s, d) at a stage [m].
         field: field P at a stage [-] and its derivatives with respect to s and d [1/m].
@@ -73,7 +71,6 @@ class Automations:
     """
 
     block: blocks.Block
-    heading: Annotated[np.ndarray, (2, WIDTH)]
     unaffected: Annotated[np.ndarray, (4, WIDTH)]
     point: Annotated[np.ndarray, (2, WIDTH)]
     field: Annotated[np.ndarray, (3, WIDTH)]
@@ -106,7 +103,6 @@ def enter(lane: int, index: int, scene: Scene, p: Parameters, U: np.ndarray, wor
     """
     block = work.block
     blocks.enter(lane, index, 0, scene, p.automation, p, block)
-    work.heading[0, lane], work.heading[1, lane] = cos(scene.z[PSI]), sin(scene.z[PSI])
     for j in range(p.automation.H_c):
         block.U[j, 0, lane], block.U[j, 1, lane] = U[j, 0], U[j, 1]
     work.limit[lane] = p.solver.first_iterations if scene.k == 0 else p.solver.iterations
@@ -138,7 +134,7 @@ def roll_out(with_model: bool, scenes: np.ndarray, parameters: np.ndarray, work:
     if with_model:
         clear(block)
     z = state_of(block.z)
-    heading = load(work.heading[0]), load(work.heading[1])
+    heading = load(block.heading[0]), load(block.heading[1])
     wheel = heading
     total = spread(0.0)
     for i in range(block.H_p):

@@ -8,6 +8,7 @@ the Gauss-Newton Hessian of half the cost (condensing).
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import Annotated, TypeAlias
 
 import numpy as np
@@ -16,7 +17,7 @@ from shared_control_env.core.compile.jit import jit, jit_inlined
 from shared_control_env.core.compile.lanes import WIDTH, Number, load, spread, store
 from shared_control_env.core.parameters import Parameters, PredictiveParameters
 from shared_control_env.core.records import MAX_CONTROL, MAX_HORIZON, Scene, record_dtype
-from shared_control_env.core.world.vehicle import V_X, Derivatives, Dynamics, R, State, Y, plus, through_step
+from shared_control_env.core.world.vehicle import PSI, V_X, Derivatives, Dynamics, R, State, Y, plus, through_step
 
 COLUMNS = 2 * MAX_CONTROL
 """Largest number of columns."""
@@ -38,6 +39,7 @@ class Block:
         H_p, H_c, kind: those of the lanes that are solved together.
         dt: step [s], the same for all lanes.
         z: states at the present.
+        heading: cosine and sine of their psi.
         kappa: curvature at the stages of the horizon [1/m].
         y_target, v_target: lateral position [m] and speed [m/s] to track.
         dynamics: parameters of the vehicle, in the order of :class:`world.vehicle.Dynamics`.
@@ -61,6 +63,7 @@ class Block:
     kind: int
     dt: float
     z: Annotated[np.ndarray, (6, WIDTH)]
+    heading: Annotated[np.ndarray, (2, WIDTH)]
     kappa: Annotated[np.ndarray, (MAX_HORIZON, WIDTH)]
     y_target: Lane
     v_target: Lane
@@ -113,6 +116,7 @@ def enter(
     block.structures[2, lane] = kind
     for i in range(6):
         block.z[i, lane] = scene.z[i]
+    block.heading[0, lane], block.heading[1, lane] = cos(scene.z[PSI]), sin(scene.z[PSI])
     for i in range(weights.H_p):
         block.kappa[i, lane] = scene.kappa[i]
     block.y_target[lane], block.v_target[lane] = scene.y_target, scene.v_target

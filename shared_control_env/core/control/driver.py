@@ -29,7 +29,7 @@ stages from the first stage on that the driver can still influence; and u_h,des 
 
 from __future__ import annotations
 
-from math import cos, exp, sin
+from math import exp
 from typing import Annotated
 
 import numpy as np
@@ -55,7 +55,6 @@ from shared_control_env.core.parameters import Parameters
 from shared_control_env.core.records import MAX_HORIZON, Scene, record_dtype
 from shared_control_env.core.risk.safe_area import lateral_bounds
 from shared_control_env.core.world.vehicle import (
-    PSI,
     V_X,
     V_Y,
     Derivatives,
@@ -118,7 +117,6 @@ class Drivers:
 
     Attributes:
         block: the block; its weights and horizons are those of Eq. 15. ``U`` is the last desired command at all stages.
-        heading: cosine and sine of the heading at the present.
         felt: the automation's actual command as felt last [m/s^2, rad].
         arm: the driver's actual command [m/s^2, rad].
         last: the driver's last desired command [m/s^2, rad].
@@ -134,7 +132,6 @@ class Drivers:
     """
 
     block: blocks.Block
-    heading: Annotated[np.ndarray, (2, WIDTH)]
     felt: Annotated[np.ndarray, (2, WIDTH)]
     arm: Annotated[np.ndarray, (2, WIDTH)]
     last: Annotated[np.ndarray, (2, WIDTH)]
@@ -170,7 +167,6 @@ def enter(
         work: record of :data:`DRIVERS`, written.
     """
     blocks.enter(lane, index, int(p.internal_model.active), scene, p.driver, p, work.block)
-    work.heading[0, lane], work.heading[1, lane] = cos(scene.z[PSI]), sin(scene.z[PSI])
     for channel in range(2):
         work.felt[channel, lane], work.arm[channel, lane] = scene.felt[channel], u_h_act[channel]
         work.last[channel, lane] = u_last[channel]
@@ -194,7 +190,7 @@ def condense(scenes: np.ndarray, work: Drivers) -> None:
     dt, car = block.dt, dynamics_of(block)
     axles = linear_axles(car)
     n, internal = 2 * block.H_c, block.kind == 1
-    start, heading = state_of(block.z), (load(work.heading[0]), load(work.heading[1]))
+    start, heading = state_of(block.z), (load(block.heading[0]), load(block.heading[1]))
     arm_a, arm_delta = load(work.arm[0]), load(work.arm[1])
     felt_a, felt_delta = load(work.felt[0]), load(work.felt[1])
     last_a, last_delta = load(work.last[0]), load(work.last[1])

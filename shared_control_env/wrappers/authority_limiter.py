@@ -66,9 +66,9 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
 
     def decide(self) -> np.ndarray | None:
         """Authorities of the planned step over both channels, shape (2,); None if the environment's own decides."""
-        shared = self.shared
         if self._given is None:
             return None  # the same function in the environment's compiled step, which is faster
+        shared = self.shared
         scene, signals = shared.scene.copy(), shared.signals_for_allocator()  # copies, which a user may change
         hide(signals, self.allocator)
         assess = shared.assessor if asks(self.allocator) else None

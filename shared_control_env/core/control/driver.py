@@ -116,7 +116,7 @@ class Drivers:
     """The drivers' problems of a block of environments; one record per thread.
 
     Attributes:
-        block: the block; its weights and horizons are those of Eq. 15. ``U`` is the last desired command at all stages.
+        block: the block; its weights and horizons are those of Eq. 15.
         felt: the automation's actual command as felt last [m/s^2, rad].
         arm: the driver's actual command [m/s^2, rad].
         last: the driver's last desired command [m/s^2, rad].

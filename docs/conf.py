@@ -34,6 +34,7 @@ extensions = [
     "sphinx_copybutton",
 ]
 exclude_patterns = ["_build"]
+highlight_language = "none"  # literal blocks of docstrings are equations
 
 html_theme = "furo"
 html_title = "shared control"

@@ -6,7 +6,7 @@ from gymnasium import spaces
 import shared_control_env  # noqa: F401
 from shared_control_env.controllers.allocators import FixedAuthority
 from shared_control_env.controllers.solution import Solution
-from shared_control_env.core.authority.fuzzy import authority
+from shared_control_env.core.authority.fuzzy import OPERATORS, authority
 from shared_control_env.envs import TwoLaneEnv
 from shared_control_env.wrappers import AuthorityLimiter, DriverModel, open_slots
 
@@ -60,6 +60,23 @@ def test_limiter_is_the_fuzzy_inference_of_the_assessed_risk():
         values.append(info["alpha_a"])
     assert max(values) == pytest.approx(1.0)
     assert min(values) < 0.4
+
+
+@pytest.mark.parametrize("operators", OPERATORS)
+def test_none_in_the_slot_is_the_fuzzy_inference_of_the_settings(operators):
+    bare, given = TwoLaneEnv({"authority": {"operators": operators}}), TwoLaneEnv()
+    bare.reset(seed=0)
+    given.reset(seed=0)
+    steering = np.array([0.0, 0.05])
+    seen = set()
+    for _ in range(30):
+        alpha = authority(float(given.signals["r_x"]), float(given.signals["r_y"]), OPERATORS.index(operators))
+        seen.add(alpha)
+        expected = given.step({"driver": steering, "authority": [alpha]})
+        found = bare.step({"driver": steering, "authority": None})
+        assert found[4]["alpha_a"] == expected[4]["alpha_a"]
+        np.testing.assert_array_equal(found[0], expected[0])
+    assert len(seen) > 5
 
 
 def test_allocators_action_is_alpha():

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
+from itertools import compress
 from pathlib import Path
 from platform import python_version
 from time import perf_counter
@@ -259,6 +260,7 @@ class Recorder:
         n: number of episodes.
 
     Attributes:
+        running: whether each episode is not over, shape (n,).
         lengths: number of time steps of each episode, shape (n,).
         crashed, left_road: whether each episode ended in a collision, or off the road, shape (n,).
         failures: number of solver failures of each episode, shape (n,).
@@ -277,7 +279,7 @@ class Recorder:
         self.lengths = np.full(n, steps)
         self.crashed, self.left_road = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
         self.failures, self.noticed, self.response = np.zeros(n, dtype=int), np.full(n, np.nan), np.zeros(n)
-        self._running = np.ones(n, dtype=bool)
+        self.running = np.ones(n, dtype=bool)
 
     def note(self, k: int, infos: Mapping[str, Any], ended: np.ndarray, scenes: np.ndarray) -> bool:
         """Record the signals of one step, and the ends of episodes.
@@ -295,21 +297,21 @@ class Recorder:
             value = np.asarray(infos[name])
             if name not in self._values:
                 self._values[name] = np.zeros((*self._shape, *value.shape[1:]), value.dtype)
-            self._values[name][k, self._running] = value[self._running]
+            self._values[name][k, self.running] = value[self.running]
         failures = infos["automation"]["failures"] + (infos["driver"]["failures"] if "driver" in infos else 0)
-        self.failures[self._running] = failures[self._running]
+        self.failures[self.running] = failures[self.running]
         if "driver" in infos:
-            self.response[self._running] = infos["driver"]["response"][self._running]
+            self.response[self.running] = infos["driver"]["response"][self.running]
             noticed = infos["driver"]["noticed"]
-            seen = self._running & np.isfinite(noticed)
+            seen = self.running & np.isfinite(noticed)
             self.noticed[seen] = noticed[seen]
-        over = self._running & ended
+        over = self.running & ended
         self.lengths[over] = k + 1
         for name in self.STATES:
             self._values[name][k + 1, over] = scenes[name][over]
         self.crashed[over], self.left_road[over] = infos["crashed"][over], ~infos["on_road"][over]
-        self._running &= ~ended
-        return bool(self._running.any())
+        self.running &= ~ended
+        return bool(self.running.any())
 
     def trajectory(self, i: int, settings: Any, wall_time: float, twin: int | None = None) -> Trajectory:
         """The trajectory of one episode.
@@ -524,7 +526,8 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
 
     Args:
         batch: the batch.
-        frames: list to which pictures of all episodes before each step are appended; None for no pictures.
+        frames: list to which pictures are appended, of the start and of the end of each step of the episodes that are
+            not over; None for no pictures.
 
     Returns:
         One row per episode: identity, end, the driver's K_h [-] and T_h [s], the person at the wheel, with the response
@@ -532,13 +535,20 @@ def run(batch: EpisodeBatch, frames: list[np.ndarray] | None = None) -> list[dic
     """
     begin = perf_counter()
     running = RunningBatch(batch, None if frames is None else "rgb_array")
-    going = True
+    going, shown = True, np.ones(len(batch.episodes), dtype=bool)
     while going:
-        if frames is not None:
-            frames.extend((running.env.render() or ())[: len(batch.episodes)])
+        _append_pictures(frames, running, shown)
+        shown = running.recorder.running[: len(batch.episodes)].copy()
         going = running.step()
+    _append_pictures(frames, running, shown)
     running.env.close()
     return running.rows((perf_counter() - begin) / len(running.configs))
+
+
+def _append_pictures(frames: list[np.ndarray] | None, running: RunningBatch, shown: np.ndarray) -> None:
+    """Append the pictures of some episodes of a batch, unless no pictures are wanted."""
+    if frames is not None:
+        frames.extend(compress(running.env.render() or (), shown))
 
 
 def fault_named(name: str) -> Fault:

@@ -26,9 +26,11 @@ from shared_control_env.evaluation import (
     evaluate,
 )
 from shared_control_env.evaluation import runner as runner_module
-from shared_control_env.evaluation.episodes import EpisodeBatch
+from shared_control_env.evaluation.episodes import EpisodeBatch, fault_named, run
+from shared_control_env.evaluation.replay import replay_episode
 from shared_control_env.evaluation.storage import IDENTITY, ResultsFolder, write_atomically
 from tests.evaluation.single import drive_single
+from tests.evaluation.test_user_automation import Cruise
 
 SMALL = Suite("two scenarios and degradations", ("lane_change", "bend"), ("none", "bias_ramp", "white_noise"))
 TIMED = ["real_time_factor"]
@@ -234,6 +236,21 @@ def test_the_command_names_what_is_wrong(tmp_path):
         assert wrong.returncode == 2
         assert words in " ".join(output.split())
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("automation", [None, Cruise])
+def test_pictures_of_an_episode_end_with_it(automation):
+    """Also where the same episode without a fault, which the metrics need, goes on."""
+    frames = []
+    fault = fault_named("bias:steering:0.4:-")
+    pairs = ("none", DRIVERS["none"]), ("none", AUTHORITIES["none"])
+    replay_episode("motorway", *pairs, fault, 3, frames, automation=automation)
+    (row,) = run(EpisodeBatch("motorway", *pairs, ((fault, 3),), {}, automation))
+    steps = round(row["duration"] * 20)
+    assert row["terminated"]
+    assert len(frames) == steps + 1 < 150
+    moved = [np.abs(b.astype(int) - a).mean() for a, b in zip(frames[:-1], frames[1:], strict=True)]
+    assert max(moved) < 5.0 * np.median(moved)  # no picture of another episode
 
 
 def test_list_and_replay(tmp_path):

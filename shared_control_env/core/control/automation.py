@@ -165,11 +165,13 @@ def _affected(s: Number, d: Number, work: Automations) -> Truth:
 
 @jit
 def _add_field(s: Number, d: Number, n: int, scenes: np.ndarray, parameters: np.ndarray, work: Automations) -> Number:
-    """Add the field's term at a position in all lanes, and return its value."""
+    """Add the field's term at a position in every lane in use, and return its value."""
     block = work.block
     store(work.point[0], s)
     store(work.point[1], d)
     for lane in range(WIDTH):
+        if block.entered[lane] == 0.0:
+            continue  # what an earlier environment left there is not used
         index = block.index[lane]
         work.field[0, lane], work.field[1, lane], work.field[2, lane] = continuous_field(
             scenes[index].area, work.point[0, lane], work.point[1, lane], parameters[index].lateral

@@ -26,7 +26,6 @@ from shared_control_env.core.loop import (
     clear_memory,
     clear_signals,
     clear_transition,
-    degrade_command,
     depart,
     evaluate,
     is_on_road,
@@ -36,13 +35,12 @@ from shared_control_env.core.loop import (
     see,
 )
 from shared_control_env.core.parameters import Parameters
-from shared_control_env.core.risk.assessment import ASSESS
 from shared_control_env.core.risk.corridor import Scratch, search_triangles
 from shared_control_env.core.risk.finding import find_area
 from shared_control_env.core.risk.triangulation import MAX_HOLES
 from shared_control_env.core.world.scene import holes_in_region, perceive
 
-allocate, assess, automate, drive = ALLOCATE.call, ASSESS.call, AUTOMATE.call, DRIVE.call
+allocate, automate, drive = ALLOCATE.call, AUTOMATE.call, DRIVE.call
 
 
 @jit_inlined
@@ -279,7 +277,8 @@ def advance_block(
     for lane in range(count):
         i = work.members[lane]
         e = environment(i, batch)
-        judge(lane, e, setup.calls, work)
+        leave(lane, work.automations, e.automation, e.signals)
+        judge(e, setup.calls, work)
         write_outputs(i, e.scene.k == 0, e, setup, out)
 
 
@@ -447,8 +446,7 @@ def decide(automated: bool, batch: Batch, setup: Setup, works: np.ndarray) -> No
         enter(0, 0, see(e, work), e.p, e.automation.U, work.automations)
         automate(setup.calls.automate, batch.scenes, batch.parameters, work.automations)
         leave(0, work.automations, e.automation, e.signals)
-    degrade_command(e)
-    assess(setup.calls.assess, e.p.task.tau_p, e.scene, e.traffic, e.line, e.p, e.signals, work.motion)
+    judge(e, setup.calls, work)
 
 
 @jit

@@ -28,7 +28,7 @@ import numpy as np
 from shared_control_env.core.authority.laws import apply_law
 from shared_control_env.core.batch import Calls, Environment, Setup, Work
 from shared_control_env.core.compile.jit import jit, jit_inlined
-from shared_control_env.core.control.automation import enter, leave
+from shared_control_env.core.control.automation import enter
 from shared_control_env.core.control.driver_lag import advance_lag
 from shared_control_env.core.faults.command import ACTUATOR, PLANNER, degrade
 from shared_control_env.core.faults.perception import misperceive, see_as_automation
@@ -61,16 +61,14 @@ def look(k: int, lane: int, i: int, e: Environment, calls: Calls, work: Work) ->
 
 
 @jit_inlined
-def judge(lane: int, e: Environment, calls: Calls, work: Work) -> None:
-    """Complete the first half: from the automation's decision to the risk of the degraded command.
+def judge(e: Environment, calls: Calls, work: Work) -> None:
+    """Complete the first half: from the automation's decision u_a,des to the risk of the degraded command.
 
     Args:
-        lane: lane of the block that the automation leaves.
-        e: the environment; its signals and the memories of the automation and of the faults are written.
+        e: the environment; its signals and the memories of the faults are written.
         calls: addresses of the compiled functions.
         work: scratch.
     """
-    leave(lane, work.automations, e.automation, e.signals)
     degrade_command(e)
     assess(calls.assess, e.p.task.tau_p, e.scene, e.traffic, e.line, e.p, e.signals, work.motion)
 

@@ -23,7 +23,6 @@ from shared_control_env.core.records import (
     TRANSITION,
     AutomationMemory,
     Memory,
-    PersonMemory,
     Scene,
     Signals,
     Transition,
@@ -81,7 +80,6 @@ class Environment(NamedTuple):
         signals: signals of that time step.
         memory: what the loop carries from step to step.
         automation: what the automation carries from step to step.
-        person: what a person at the wheel carries from step to step.
         transition: what the reward needs from before and after the last step.
         state: ego ``[x, y, psi, v_x, v_y, r]`` [m, rad, m/s, rad/s], shape (6,).
         line: reference line of the road, shape (n, 12).
@@ -96,7 +94,6 @@ class Environment(NamedTuple):
     signals: Signals
     memory: Memory
     automation: AutomationMemory
-    person: PersonMemory
     transition: Transition
     state: np.ndarray
     line: np.ndarray
@@ -120,7 +117,6 @@ def environment(i: int, batch: Batch) -> Environment:
         batch.signals[i],
         batch.memories[i],
         batch.automations[i],
-        batch.persons[min(i, batch.persons.shape[0] - 1)],
         batch.transitions[i],
         batch.states[i],
         batch.lines[i],

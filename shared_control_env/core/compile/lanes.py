@@ -73,19 +73,15 @@ class _MaskModel(PrimitiveModel):
         super().__init__(manager, kind, _BITS)
 
 
-def _spread(builder: Any, value: Any, kind: Any) -> Any:
-    """The same value in every lane."""
-    nowhere, position = ir.Constant(kind, ir.Undefined), ir.IntType(32)
+def _spread(builder: Any, value: Any) -> Any:
+    """The same float in every lane."""
+    nowhere, position = ir.Constant(_REAL, ir.Undefined), ir.IntType(32)
     first = builder.insert_element(nowhere, value, ir.Constant(position, 0))
     return builder.shuffle_vector(first, nowhere, ir.Constant(ir.VectorType(position, WIDTH), [0] * WIDTH))
 
 
 def _as_lanes(context: Any, builder: Any, value: Any, kind: Any) -> Any:
-    return value if kind is LANES else _spread(builder, context.cast(builder, value, kind, types.float64), _REAL)
-
-
-def _as_mask(builder: Any, value: Any, kind: Any) -> Any:
-    return value if kind is MASK else _spread(builder, builder.trunc(value, ir.IntType(1)), _BITS)
+    return value if kind is LANES else _spread(builder, context.cast(builder, value, kind, types.float64))
 
 
 def _define(
@@ -194,7 +190,7 @@ def _choose(_: Any, condition: Any, then: Any, otherwise: Any) -> Any:
             chosen = [
                 context.cast(builder, *each, types.float64) for each in zip(values[1:], typed.args[1:], strict=True)
             ]
-            return builder.select(builder.trunc(values[0], ir.IntType(1)), *chosen)
+            return builder.select(values[0], *chosen)
 
         return types.float64(condition, then, otherwise), generate_one
 
@@ -209,9 +205,7 @@ def _choose(_: Any, condition: Any, then: Any, otherwise: Any) -> Any:
 def _holds_in_any(_: Any, condition: Any) -> Any:
     def generate(context: Any, builder: Any, typed: Any, values: Any) -> Any:
         bits = builder.bitcast(values[0], ir.IntType(WIDTH))
-        return context.cast(
-            builder, builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0)), types.boolean, types.boolean
-        )
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
 
     return types.boolean(condition), generate
 

@@ -24,9 +24,6 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
         env: an environment whose authority slot is open.
         allocator: the allocator; by default the fuzzy inference, with the operators of the settings.
 
-    Attributes:
-        allocator: the allocator in use.
-
     Raises:
         ValueError: if the allocator is not an object with ``reset`` and ``allocate``.
     """
@@ -42,10 +39,11 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
             check_reset(allocator, f"allocator = {allocator!r}")
         follows_settings = type(allocator) is FuzzyAuthority and allocator.operators is None
         self._given = None if follows_settings else allocator
-        self.allocator: Allocator = self._default() if self._given is None else self._given
 
-    def _default(self) -> FuzzyAuthority:
-        return FuzzyAuthority(self.shared.episode.authority.operators)
+    @property
+    def allocator(self) -> Allocator:
+        """The allocator in use."""
+        return FuzzyAuthority(self.shared.episode.authority.operators) if self._given is None else self._given
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Reset the environment and the allocator.
@@ -57,11 +55,9 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
             options: options of Gymnasium's ``reset``.
         """
         result = self.env.reset(seed=seed, options=options)
-        if self._given is None:
-            self.allocator = self._default()
-        else:
+        if self._given is not None:
             (own,) = self.shared.np_random.spawn(1)
-            self.allocator.reset(seed=int(own.integers(2**31)))
+            self._given.reset(seed=int(own.integers(2**31)))
         return result
 
     def decide(self) -> np.ndarray | None:
@@ -70,8 +66,8 @@ class AuthorityLimiter(SlotWrapper, RecordConstructorArgs):
             return None  # the same function in the environment's compiled step, which is faster
         shared = self.shared
         scene, signals = shared.scene.copy(), shared.signals_for_allocator()  # copies, which a user may change
-        hide(signals, self.allocator)
-        assess = shared.assessor if asks(self.allocator) else None
-        alphas, alert = decide(self.allocator, scene, signals, assess, "allocator")
+        hide(signals, self._given)
+        assess = shared.assessor if asks(self._given) else None
+        alphas, alert = decide(self._given, scene, signals, assess, "allocator")
         shared.signals["alert"] = alert
         return alphas

@@ -45,7 +45,7 @@ def solve_posed(scenes: np.ndarray, parameters: np.ndarray, automations: Any) ->
 
 
 @jit
-def linearise(with_model: bool, scenes: np.ndarray, parameters: np.ndarray, automations: Any) -> None:
+def roll_out_posed(with_model: bool, scenes: np.ndarray, parameters: np.ndarray, automations: Any) -> None:
     """Call :func:`core.control.automation.roll_out` with its record as a 0-d array.
 
     Args:
@@ -83,7 +83,7 @@ def automation_cost(U: np.ndarray, scene: np.ndarray, parameters: np.ndarray, wo
         scene, parameters, work: records as 0-d arrays.
     """
     pose(U, scene.reshape(1), parameters.reshape(1), 0, work)
-    linearise(False, scene.reshape(1), parameters.reshape(1), work)
+    roll_out_posed(False, scene.reshape(1), parameters.reshape(1), work)
     return float(work["block"]["value"][0])
 
 

@@ -126,8 +126,8 @@ class Drivers:
         side: rows of the sides of C, one for each stage.
         lower, upper: sides of C less the position for U = 0, at each stage [m].
         end: row of the end of C.
-        end_of_area: path length at which the front of the car reaches the end of C, less half its length [m].
-        room: that less the path length for U = 0 at the last stage [m].
+        end_of_area: path length of the car's centre when its front reaches the end of C [m].
+        room: end_of_area less the path length for U = 0 at the last stage [m].
         command: the drivers' desired commands ``[a, delta]`` [m/s^2, rad].
     """
 
@@ -219,8 +219,9 @@ def condense(scenes: np.ndarray, work: Drivers) -> None:
         columns = n if internal else 2 * min(i, block.H_c - 1) + 2
         propagate(block, columns, step, not internal)
         if internal:
-            z_next = plus(z_next, _by_command(felt_a + arm_a, felt_delta + arm_delta, step))
-            _add_arm(i, felt_a + arm_a, felt_delta + arm_delta, step, work)
+            u_a, u_delta = felt_a + arm_a, felt_delta + arm_delta
+            z_next = plus(z_next, _by_command(u_a, u_delta, step))
+            _add_arm(i, u_a, u_delta, step, work)
             arm_a, arm_delta = phi * arm_a - rise * felt_a, phi * arm_delta - rise * felt_delta
             for c in range(n):
                 gain = phi * load(work.gain[c])

@@ -368,7 +368,7 @@ def derivatives(
     by_v_y = v_vy, i11 * v + V_v * v_vy, i21 * v + R_v * v_vy
     by_r = v_r, i12 * v + V_v * v_r, i22 * v + R_v * v_r
     by_a = v_a, V_v * v_a, R_v * v_a
-    by_delta = 0.0 * v, V_d, R_d
+    by_delta = 0.0 * v, V_d, R_d  # a zero of the kind that v is, float or lanes
 
     # s', psi+ and y+ by the chain rule through v, v_y+ and r+.
     stretch = 1.0 / (1.0 - kappa * y)

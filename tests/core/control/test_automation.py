@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from benchmarks.controllers import automation_cost, linearise, pose, solve_automation
+from benchmarks.controllers import automation_cost, pose, roll_out_posed, solve_automation
 from shared_control_env.core.control import automation
 from shared_control_env.core.control.automation import AUTOMATIONS
 from shared_control_env.core.parameters import Parameters
@@ -119,7 +119,7 @@ def test_gradient_matches_finite_differences(line):
         U = np.zeros((MAX_CONTROL, 2))
         U[:3] = rng.uniform(-0.3, 0.3, (3, 2)) * SCALE
         pose(U, scene.reshape(1), PARAMETERS.reshape(1), 0, work)
-        linearise(True, scene.reshape(1), PARAMETERS.reshape(1), work)
+        roll_out_posed(True, scene.reshape(1), PARAMETERS.reshape(1), work)
         gradient = 2.0 * work["block"]["gradient"][:6, 0].copy()
         numeric = []
         for c in range(6):

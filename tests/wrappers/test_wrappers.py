@@ -79,6 +79,15 @@ def test_none_in_the_slot_is_the_fuzzy_inference_of_the_settings(operators):
     assert len(seen) > 5
 
 
+def test_the_allocator_in_use_is_shown_and_cannot_be_assigned():
+    limited = AuthorityLimiter(TwoLaneEnv({"authority": {"operators": OPERATORS[1]}}))
+    assert limited.allocator.operators == OPERATORS[1]
+    given = FixedAuthority(0.5)
+    assert AuthorityLimiter(TwoLaneEnv(), given).allocator is given
+    with pytest.raises(AttributeError):
+        limited.allocator = given
+
+
 def test_allocators_action_is_alpha():
     env = DriverModel(TwoLaneEnv({"authority": {"law": "proportional"}}))
     env.reset(seed=0)
